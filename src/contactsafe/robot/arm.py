@@ -1,0 +1,155 @@
+"""An arm as the controller knows it: a nominal model, its limits, its tool."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
+from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
+from contactsafe.robot.rotation import matrix_to_quat
+
+
+class Pose(NamedTuple):
+    """Where a frame is, in world axes.
+
+    Attributes:
+        position: (3,), m.
+        quat: unit quaternion w x y z, (4,).
+    """
+
+    position: np.ndarray
+    quat: np.ndarray
+
+
+class NominalModel:
+    """One private copy of an arm's nominal model, to be used from one thread at a time.
+
+    Attributes:
+        handle: `handle_dtype` record for compiled code.
+    """
+
+    def __init__(self, model: mujoco.MjModel, site: str):
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._site = site
+        self.handle = make_handle(model, self._data, site)[0]
+
+    def __reduce__(self):
+        """Pickle by building anew: addresses mean nothing in another process."""
+        return NominalModel, (self._model, self._site)
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A serial torque-controlled arm with its tool.
+
+    Attributes:
+        name: of the robot.
+        model: nominal MuJoCo model of the arm alone; rotor inertia included.
+        site: end-effector point in `model`.
+        q_min, q_max: joint range, (n,), rad.
+        qd_max: joint speed limits, (n,), rad/s.
+        tau_max: joint torque limits, (n,), N m.
+        torque_rate_max: N m/s, every joint.
+        friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
+        home: a posture well inside the limits, (n,), rad.
+        facts: what the model was generated from; None for a user's own.
+        tool: what the flange carries; None for a user's own.
+    """
+
+    name: str
+    model: mujoco.MjModel
+    site: str
+    q_min: np.ndarray
+    q_max: np.ndarray
+    qd_max: np.ndarray
+    tau_max: np.ndarray
+    torque_rate_max: float
+    friction: np.ndarray
+    home: np.ndarray
+    facts: ArmFacts | None = None
+    tool: Tool | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.model.nv)
+
+    def nominal(self) -> NominalModel:
+        """Make a copy of the nominal model for one controller or one thread."""
+        return NominalModel(self.model, self.site)
+
+    def joint_vector(self, value, name: str) -> np.ndarray:
+        """Check a joint-space vector at the door.
+
+        Args:
+            value: n finite numbers.
+            name: what to call it in the message.
+
+        Returns:
+            Float array, (n,).
+
+        Raises:
+            InvalidInputError: wrong shape or not finite.
+        """
+        return finite_array(value, (self.n,), name)
+
+    def tool_pose(self, q) -> Pose:
+        """Give the tool's pose at joint positions q (n,), rad."""
+        q = self.joint_vector(q, "q")
+        position, rotation, J = np.zeros(3), np.zeros((3, 3)), np.zeros((6, self.n))
+        forward_kinematics(self.nominal().handle, q, position, rotation, J)
+        return Pose(position, matrix_to_quat(rotation))
+
+    def dynamics(self, q, qd) -> np.void:
+        """Evaluate the nominal dynamics at q (n,) rad, qd (n,) rad/s; a `dynamics_dtype` record."""
+        out = np.zeros(1, dtype=dynamics_dtype(self.n))
+        update_dynamics(self.nominal().handle, self.joint_vector(q, "q"), self.joint_vector(qd, "qd"), out[0])
+        return out[0]
+
+
+def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Check an array at the door: its shape, and that every number is finite.
+
+    Raises:
+        InvalidInputError: naming what was found and what is allowed.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}"
+        ) from None
+    if array.shape != shape:
+        raise InvalidInputError(f"{name} has shape {array.shape}; give {_words(shape)}")
+    if not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f"[{', '.join(map(str, index))}]" if index else ""
+        raise InvalidInputError(f"{name}{where} = {array[index]}; every number must be finite")
+    return array
+
+
+def _words(shape: tuple[int, ...]) -> str:
+    return " × ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"
+
+
+def arm_from_facts(facts: ArmFacts, tool: Tool) -> Arm:
+    """Build an arm from its facts and a tool."""
+    return Arm(
+        name=facts.name,
+        model=mujoco.MjModel.from_xml_string(arm_mjcf(facts, tool)),
+        site=TOOL_SITE,
+        q_min=facts.joint_array("q_min"),
+        q_max=facts.joint_array("q_max"),
+        qd_max=facts.joint_array("qd_max"),
+        tau_max=facts.joint_array("tau_max"),
+        torque_rate_max=facts.torque_rate_max,
+        friction=facts.joint_array("friction"),
+        home=np.array(facts.home),
+        facts=facts,
+        tool=tool,
+    )

@@ -1,0 +1,101 @@
+"""Small dense algebra for the compiled tick: matrices of six or seven rows, where a LAPACK call costs more than the work."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def spd_inverse(A, out):
+    """Invert a symmetric positive-definite matrix by Cholesky.
+
+    Args:
+        A: (n, n).
+        out: receives A⁻¹, (n, n); untouched on failure.
+
+    Returns:
+        False where A is not positive definite.
+    """
+    n = A.shape[0]
+    L = np.zeros((n, n))
+    for j in range(n):
+        d = A[j, j]
+        for k in range(j):
+            d -= L[j, k] * L[j, k]
+        if not d > 0.0:
+            return False
+        L[j, j] = np.sqrt(d)
+        for i in range(j + 1, n):
+            s = A[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            L[i, j] = s / L[j, j]
+    Li = np.zeros((n, n))
+    for j in range(n):
+        Li[j, j] = 1.0 / L[j, j]
+        for i in range(j + 1, n):
+            s = 0.0
+            for k in range(j, i):
+                s -= L[i, k] * Li[k, j]
+            Li[i, j] = s / L[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            s = 0.0
+            for k in range(i, n):
+                s += Li[k, i] * Li[k, j]
+            out[i, j] = s
+            out[j, i] = s
+    return True
+
+
+@njit(cache=True)
+def matmul(A, B):
+    """Multiply two small matrices, (m, k) and (k, n)."""
+    out = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            a = A[i, k]
+            for j in range(B.shape[1]):
+                out[i, j] += a * B[k, j]
+    return out
+
+
+@njit(cache=True)
+def matvec(A, x):
+    """Multiply a small matrix and a vector, (m, n) and (n,)."""
+    out = np.empty(A.shape[0])
+    for i in range(A.shape[0]):
+        s = 0.0
+        for j in range(A.shape[1]):
+            s += A[i, j] * x[j]
+        out[i] = s
+    return out
+
+
+@njit(cache=True)
+def matvec_t(A, x):
+    """Multiply a transposed small matrix and a vector, Aᵀ x with (m, n) and (m,)."""
+    out = np.zeros(A.shape[1])
+    for i in range(A.shape[0]):
+        a = x[i]
+        for j in range(A.shape[1]):
+            out[j] += A[i, j] * a
+    return out
+
+
+@njit(cache=True)
+def dot(x, y):
+    """Multiply two small vectors, (n,) and (n,)."""
+    s = 0.0
+    for i in range(x.shape[0]):
+        s += x[i] * y[i]
+    return s
+
+
+@njit(cache=True)
+def cross(x, y):
+    """Give x × y, (3,)."""
+    out = np.empty(3)
+    out[0] = x[1] * y[2] - x[2] * y[1]
+    out[1] = x[2] * y[0] - x[0] * y[2]
+    out[2] = x[0] * y[1] - x[1] * y[0]
+    return out

@@ -1,0 +1,103 @@
+"""MJCF generated from an arm's facts: the same arm for the nominal model, the plant and the pictures."""
+
+import xml.etree.ElementTree as ET
+
+from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Tool
+
+TOOL_SITE = "tcp"
+FLANGE_SITE = "flange"
+
+
+def numbers(values) -> str:
+    """Write numbers for an XML attribute so that they read back to the same floats."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _inertial(parent: ET.Element, inertia: Inertia) -> None:
+    ET.SubElement(
+        parent, "inertial", mass=numbers([inertia.mass]), pos=numbers(inertia.com), fullinertia=numbers(inertia.tensor)
+    )
+
+
+def _capsules(parent: ET.Element, prefix: str, capsules: tuple[Capsule, ...]) -> None:
+    for index, capsule in enumerate(capsules):
+        ET.SubElement(
+            parent,
+            "geom",
+            {"class": "arm"},
+            name=f"{prefix}_{index}",
+            type="capsule",
+            fromto=numbers((*capsule.start, *capsule.end)),
+            size=numbers([capsule.radius]),
+        )
+
+
+def arm_default() -> ET.Element:
+    """Give the default class for the arm's geoms: they meet the world, never each other."""
+    default = ET.Element("default")
+    inner = ET.SubElement(default, "default", {"class": "arm"})
+    ET.SubElement(inner, "geom", contype="2", conaffinity="1", rgba="0.93 0.93 0.95 1", group="2")
+    return default
+
+
+def arm_body(facts: ArmFacts, tool: Tool) -> ET.Element:
+    """Build the body tree of an arm with its tool, base at the world origin.
+
+    Bodies are `link0` … `link<n>` and `tool`; joints `joint1` …; sites `flange` (in `tool`, at the mount) and `tcp`.
+    """
+    base = ET.Element("body", name="link0")
+    _inertial(base, facts.base)
+    _capsules(base, "link0", facts.base_capsules)
+    parent = base
+    for index, link in enumerate(facts.links, start=1):
+        parent = ET.SubElement(parent, "body", name=f"link{index}", pos=numbers(link.position), quat=numbers(link.quat))
+        _inertial(parent, link.inertia)
+        ET.SubElement(
+            parent,
+            "joint",
+            name=f"joint{index}",
+            axis="0 0 1",
+            range=numbers((link.joint.q_min, link.joint.q_max)),
+            armature=numbers([link.joint.armature]),
+        )
+        _capsules(parent, f"link{index}", link.capsules)
+    mount = ET.SubElement(parent, "body", name="tool", pos=numbers(facts.mount_position), quat=numbers(facts.mount_quat))
+    _inertial(mount, tool.inertia)
+    _capsules(mount, "tool", tool.capsules)
+    if tool.pad_half_size is not None:
+        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.pad_half_size[2])
+        ET.SubElement(
+            mount,
+            "geom",
+            {"class": "arm"},
+            name="pad",
+            type="box",
+            pos=numbers(centre),
+            size=numbers(tool.pad_half_size),
+            rgba="0.2 0.35 0.7 1",
+        )
+    ET.SubElement(mount, "site", name=FLANGE_SITE)
+    ET.SubElement(mount, "site", name=TOOL_SITE, pos=numbers(tool.tcp))
+    return base
+
+
+def model_root(name: str) -> ET.Element:
+    """Start an MJCF document with the options every model here shares; 1 kHz, dense Jacobians (mujoco 4.0.0 needs them)."""
+    root = ET.Element("mujoco", model=name)
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(root, "option", timestep="0.001", jacobian="dense", cone="elliptic")
+    root.append(arm_default())
+    return root
+
+
+def arm_mjcf(facts: ArmFacts, tool: Tool) -> str:
+    """Write the arm alone, fixed at the origin, with motors of the stated torque limits."""
+    root = model_root(facts.name)
+    world = ET.SubElement(root, "worldbody")
+    world.append(arm_body(facts, tool))
+    actuator = ET.SubElement(root, "actuator")
+    for index, link in enumerate(facts.links, start=1):
+        limit = link.joint.tau_max
+        ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}", ctrlrange=numbers((-limit, limit)))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
