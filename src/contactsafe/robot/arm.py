@@ -102,13 +102,15 @@ class Arm:
         """Give the tool's pose at joint positions q (n,), rad."""
         q = self.joint_vector(q, "q")
         position, rotation, J = np.zeros(3), np.zeros((3, 3)), np.zeros((6, self.n))
-        forward_kinematics(self.nominal().handle, q, position, rotation, J)
+        nominal = self.nominal()  # named, so that it outlives the call: the handle is but an address
+        forward_kinematics(nominal.handle, q, position, rotation, J)
         return Pose(position, matrix_to_quat(rotation))
 
     def dynamics(self, q, qd) -> np.void:
         """Evaluate the nominal dynamics at q (n,) rad, qd (n,) rad/s; a `dynamics_dtype` record."""
         out = np.zeros(1, dtype=dynamics_dtype(self.n))
-        update_dynamics(self.nominal().handle, self.joint_vector(q, "q"), self.joint_vector(qd, "qd"), out[0])
+        nominal = self.nominal()
+        update_dynamics(nominal.handle, self.joint_vector(q, "q"), self.joint_vector(qd, "qd"), out[0])
         return out[0]
 
 
