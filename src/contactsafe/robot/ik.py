@@ -1,0 +1,225 @@
+"""Inverse kinematics: a compiled solver for the 60 Hz path, and a patient one that starts from anywhere."""
+
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from contactsafe.errors import InvalidInputError, UnreachableError
+from contactsafe.robot.arm import Arm, Pose, finite_array
+from contactsafe.robot.dynamics import forward_kinematics
+from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
+from contactsafe.robot.rotation import orientation_error, quat_to_matrix
+from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
+
+try:
+    from trac_ik import TracIK
+except ImportError:  # no wheel for this platform: the compiled solver serves alone
+    TracIK = None
+
+POSITION_TOLERANCE = 1e-4
+"""A pose counts as reached within this, m."""
+
+ROTATION_TOLERANCE = math.radians(0.01)
+"""A pose counts as reached within this, rad."""
+
+_ITERATIONS = 20
+_STEP = 0.5  # largest change of one joint in one iteration, rad: the linearised arm is worth little beyond
+_DAMPING = 1e-6  # keeps the normal matrix invertible in a singularity; too small to be felt elsewhere
+_MARGIN = 0.1  # rad from a joint limit at which the pull off it begins
+_PULL = 0.2  # share of the missing margin that one iteration asks to win back
+
+
+class InverseKinematics:
+    """Find joint positions for tool poses, one thread at a time.
+
+    Args:
+        arm: whose limits and kinematics count.
+    """
+
+    def __init__(self, arm: Arm):
+        self._arm = arm
+        self._nominal = arm.nominal()
+        middle = (arm.q_min + arm.q_max) / 2
+        spread = np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (_SEEDS, arm.n))
+        self._seeds = [arm.home, middle, *spread]
+        self._reference = _trac_ik(arm)
+
+    def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
+        """Find joint positions within the limits that put the tool at a pose.
+
+        Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then from home and from other fixed
+        postures; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from facts. The same
+        call on the same arm gives the same answer, unless it was TRAC-IK's, whose search is random.
+
+        Args:
+            pose: of the tool, world; position (3,) m, unit quaternion w x y z (4,).
+            q_seed: where to start, (n,), rad; home where None.
+
+        Returns:
+            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and `ROTATION_TOLERANCE`.
+
+        Raises:
+            InvalidInputError: wrong shape, not finite, or a quaternion that is not of unit length to 1e-3.
+            UnreachableError: no solution found.
+        """
+        position, quat = _checked_pose(pose)
+        first = self._arm.home if q_seed is None else self._arm.joint_vector(q_seed, "q_seed")
+        nearest = (math.inf, math.inf)
+        for seed in (first, *self._seeds):
+            q, error = self._from_seed(position, quat, seed)
+            if _reached(error):
+                return q
+            nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + e[1] / ROTATION_TOLERANCE)
+        if self._reference is not None:
+            found = self._reference.ik(position, quat_to_matrix(quat), first)
+            if found is not None:
+                q, error = self._from_seed(position, quat, found)
+                if _reached(error):
+                    return q
+        raise UnreachableError(
+            f"pose at [{', '.join(f'{x:.3f}' for x in position)}] m was not reached: the nearest found is "
+            f"{error_words(*nearest)} away, allowed is {error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
+            "move it towards the arm, turn it, or give another q_seed"
+        )
+
+    def _from_seed(self, position, quat, seed):
+        q = np.empty(self._arm.n)
+        error = solve_ik(self._nominal.handle, position, quat, seed, self._arm.q_min, self._arm.q_max, q)
+        return q, error
+
+
+_SEEDS = 20
+
+
+def error_words(position_error_m: float, rotation_error_rad: float) -> str:
+    """Write a pose error for a message."""
+    return f"{1e3 * position_error_m:.1f} mm and {math.degrees(rotation_error_rad):.2f}°"
+
+
+def _checked_pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+    position = finite_array(pose.position, (3,), "pose.position")
+    quat = finite_array(pose.quat, (4,), "pose.quat")
+    norm = float(np.linalg.norm(quat))
+    if abs(norm - 1) > 1e-3:
+        raise InvalidInputError(
+            f"pose.quat has length {norm:.4g}; a unit quaternion w x y z has length 1 within 0.001; divide it by its length"
+        )
+    return position, quat / norm
+
+
+def _reached(error: tuple[float, float]) -> bool:
+    return error[0] <= POSITION_TOLERANCE and error[1] <= ROTATION_TOLERANCE
+
+
+def _trac_ik(arm: Arm):
+    """Set up TRAC-IK on the generated URDF; None where it cannot be had."""
+    if TracIK is None or arm.facts is None or arm.tool is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "arm.urdf"  # TracIK reads a file once, here
+        path.write_text(arm_urdf(arm.facts, arm.tool), encoding="utf-8")
+        solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=0.02)
+    solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader may leave them open
+    return solver
+
+
+@njit(cache=True, nogil=True)
+def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
+    """Put the tool at a pose by damped least squares from a seed; no allocation outlives the call, no exception.
+
+    Levenberg-Marquardt with damping that grows with the error (Sugihara 2011): far steps are short and
+    singularities do no harm, near ones are Gauss-Newton. Each step is the smallest that serves, so the arm's redundant
+    motion stays where the seed left it, but for a pull off joint limits that are near.
+
+    Args:
+        handle: record of a nominal model that nobody else is using, `handle_dtype`.
+        position: of the tool, world, (3,), m.
+        quat: of the tool, world, unit w x y z, (4,).
+        q_seed: where to start, (n,), rad.
+        q_min: lower joint limits, (n,), rad.
+        q_max: upper joint limits, (n,), rad.
+        q_out: receives the joint positions, (n,), rad; always within the limits.
+
+    Returns:
+        Position error in m and rotation error in rad at `q_out`; NaN where the input was not finite.
+    """
+    n = q_seed.shape[0]
+    found, rotation, J = np.empty(3), np.empty((3, 3)), np.empty((6, n))
+    error, step, free = np.empty(6), np.empty(n), np.empty(n)
+    A, A_inv = np.empty((6, 6)), np.empty((6, 6))
+    for i in range(n):
+        q_out[i] = min(max(q_seed[i], q_min[i]), q_max[i])
+    for iteration in range(_ITERATIONS + 1):
+        forward_kinematics(handle, q_out, found, rotation, J)
+        turn = orientation_error(quat, rotation)
+        for k in range(3):
+            error[k] = position[k] - found[k]
+            error[3 + k] = turn[k]
+        position_error = math.sqrt(dot(error[:3], error[:3]))
+        rotation_error = math.sqrt(dot(turn, turn))
+        if position_error <= POSITION_TOLERANCE and rotation_error <= ROTATION_TOLERANCE:
+            break
+        if iteration == _ITERATIONS or not position_error + rotation_error < math.inf:
+            break
+        _limited_step(J, error, q_out, q_min, q_max, step, free, A, A_inv)
+        for i in range(n):
+            q_out[i] = min(max(q_out[i] + step[i], q_min[i]), q_max[i])
+    return position_error, rotation_error
+
+
+@njit(cache=True)
+def _limited_step(J, error, q, q_min, q_max, step, free, A, A_inv):
+    """Fill the step: joints that it would carry past a limit stop there, and the others make up for them."""
+    n = q.shape[0]
+    for i in range(n):
+        free[i] = 1.0
+        below, above = q_min[i] + _MARGIN - q[i], q[i] - (q_max[i] - _MARGIN)
+        step[i] = _PULL * (max(below, 0.0) - max(above, 0.0))
+    wanted = step.copy()
+    for _ in range(n):
+        _damped_step(J, error, wanted, free, step, A, A_inv)
+        _shorten(step)
+        stopped = False
+        for i in range(n):
+            past = not q_min[i] <= q[i] + step[i] <= q_max[i]
+            if free[i] == 1.0 and past:
+                free[i] = 0.0
+                wanted[i] = min(max(q[i] + step[i], q_min[i]), q_max[i]) - q[i]
+                stopped = True
+        if not stopped:
+            return
+
+
+@njit(cache=True)
+def _damped_step(J, error, wanted, free, step, A, A_inv):
+    """Step = wanted + Jᵀ (J Jᵀ + λ 1)⁻¹ (error − J wanted), joints that are not free left as wanted; λ = ½ |error|²."""
+    n = wanted.shape[0]
+    damping = 0.5 * dot(error, error) + _DAMPING
+    for i in range(6):
+        for j in range(i + 1):
+            s = 0.0
+            for k in range(n):
+                s += J[i, k] * free[k] * J[j, k]
+            A[i, j] = s
+            A[j, i] = s
+        A[i, i] += damping
+    spd_inverse(A, A_inv)
+    missing = matvec(J, wanted)
+    for i in range(6):
+        missing[i] = error[i] - missing[i]
+    correction = matvec_t(J, matvec(A_inv, missing))
+    for i in range(n):
+        step[i] = wanted[i] + free[i] * correction[i]
+
+
+@njit(cache=True)
+def _shorten(step):
+    largest = 0.0
+    for i in range(step.shape[0]):
+        largest = max(largest, abs(step[i]))
+    if largest > _STEP:
+        for i in range(step.shape[0]):
+            step[i] *= _STEP / largest
