@@ -123,9 +123,7 @@ def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InvalidInputError(
-            f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}"
-        ) from None
+        raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}") from None
     if array.shape != shape:
         raise InvalidInputError(f"{name} has shape {array.shape}; give {_words(shape)}")
     if not np.isfinite(array).all():

@@ -38,7 +38,6 @@ class Inertia:
     com: Vector3
     tensor: tuple[float, float, float, float, float, float]
 
-
     def matrix(self) -> np.ndarray:
         """Give the tensor as a symmetric matrix, (3, 3), kg m²."""
         xx, yy, zz, xy, xz, yz = self.tensor

@@ -61,7 +61,9 @@ def arm_body(facts: ArmFacts, tool: Tool) -> ET.Element:
             armature=numbers([link.joint.armature]),
         )
         _capsules(parent, f"link{index}", link.capsules)
-    mount = ET.SubElement(parent, "body", name="tool", pos=numbers(facts.mount_position), quat=numbers(facts.mount_quat))
+    mount = ET.SubElement(
+        parent, "body", name="tool", pos=numbers(facts.mount_position), quat=numbers(facts.mount_quat)
+    )
     _inertial(mount, tool.inertia)
     _capsules(mount, "tool", tool.capsules)
     if tool.pad_half_size is not None:
@@ -98,6 +100,8 @@ def arm_mjcf(facts: ArmFacts, tool: Tool) -> str:
     actuator = ET.SubElement(root, "actuator")
     for index, link in enumerate(facts.links, start=1):
         limit = link.joint.tau_max
-        ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}", ctrlrange=numbers((-limit, limit)))
+        ET.SubElement(
+            actuator, "motor", name=f"motor{index}", joint=f"joint{index}", ctrlrange=numbers((-limit, limit))
+        )
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")

@@ -35,7 +35,9 @@ def arm_urdf(facts: ArmFacts, tool: Tool) -> str:
     _joint(robot, "base_mount", "fixed", (BASE_LINK, "link0"), (0.0, 0.0, 0.0), _UPRIGHT)
     for index, link in enumerate(facts.links, start=1):
         _link(robot, f"link{index}", link.inertia, link.capsules)
-        joint = _joint(robot, f"joint{index}", "revolute", (f"link{index - 1}", f"link{index}"), link.position, link.quat)
+        joint = _joint(
+            robot, f"joint{index}", "revolute", (f"link{index - 1}", f"link{index}"), link.position, link.quat
+        )
         ET.SubElement(joint, "axis", xyz="0 0 1")
         _limit(joint, link.joint)
     mount = _link(robot, "tool", tool.inertia, tool.capsules)
@@ -55,7 +57,9 @@ def _link(robot: ET.Element, name: str, inertia: Inertia, capsules: tuple[Capsul
     _origin(inertial, inertia.com, (0.0, 0.0, 0.0))
     ET.SubElement(inertial, "mass", value=numbers([inertia.mass]))
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    ET.SubElement(inertial, "inertia", {key: numbers([value]) for key, value in zip(names, inertia.tensor, strict=True)})
+    ET.SubElement(
+        inertial, "inertia", {key: numbers([value]) for key, value in zip(names, inertia.tensor, strict=True)}
+    )
     for capsule in capsules:
         _capsule(link, capsule)
     return link
