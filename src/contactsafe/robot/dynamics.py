@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from contactsafe.robot.linalg import cross, spd_inverse
+from contactsafe.robot.linalg import cross_into, dot, spd_inverse
 from contactsafe.robot.native import (
     mj_comPos,
     mj_comVel,
@@ -79,7 +79,7 @@ def _set_configuration(handle, q):
     mj_comPos(handle.model, handle.data)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def forward_kinematics(handle, q, position, rotation, J):
     """Place the arm at q (n,) and fill the tool point (3,), its axes (3, 3) and its Jacobian (6, n)."""
     _set_configuration(handle, q)
@@ -109,10 +109,14 @@ def _gravity(handle, n, g):
     subtree_mass = view1(handle.body_subtreemass, handle.nbody)
     xanchor = view2(handle.xanchor, n, 3)
     xaxis = view2(handle.xaxis, n, 3)
+    arm, weight, torque = np.empty(3), np.empty(3), np.empty(3)
     for i in range(n):
         body = handle.first_body + i
-        torque = cross(subtree_com[body] - xanchor[i], subtree_mass[body] * handle.gravity)
-        g[i] = -(xaxis[i, 0] * torque[0] + xaxis[i, 1] * torque[1] + xaxis[i, 2] * torque[2])
+        for k in range(3):
+            arm[k] = subtree_com[body, k] - xanchor[i, k]
+            weight[k] = subtree_mass[body] * handle.gravity[k]
+        cross_into(arm, weight, torque)
+        g[i] = -dot(xaxis[i], torque)
 
 
 @njit(cache=True)
@@ -155,19 +159,26 @@ def _jacobian_rate(handle, n, out):
     cdof_dot = view2(handle.cdof_dot, n, 6)
     qvel = view1(handle.qvel, n)
     v = view2(handle.cvel, handle.nbody, 6)[handle.tool_body]
-    r = view2(handle.site_xpos, handle.site + 1, 3)[handle.site] - view2(handle.subtree_com, 2, 3)[1]
-    a = np.zeros(6)
+    tool = view2(handle.site_xpos, handle.site + 1, 3)[handle.site]
+    centre = view2(handle.subtree_com, 2, 3)[1]
+    a, r = np.zeros(6), np.empty(3)
     for i in range(n):
         for k in range(6):
             a[k] += cdof_dot[i, k] * qvel[i]
-    v_point = v[3:] + cross(v[:3], r)
-    linear = a[3:] + cross(a[:3], r) + cross(v[:3], v_point)
+    v_point, turn, swing = np.empty(3), np.empty(3), np.empty(3)
     for k in range(3):
-        out[k] = linear[k]
+        r[k] = tool[k] - centre[k]
+    cross_into(v[:3], r, v_point)
+    for k in range(3):
+        v_point[k] += v[3 + k]
+    cross_into(a[:3], r, turn)
+    cross_into(v[:3], v_point, swing)
+    for k in range(3):
+        out[k] = a[3 + k] + turn[k] + swing[k]
         out[3 + k] = a[k]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def update_dynamics(handle, q, qd, out):
     """Fill a `dynamics_dtype` record for joint positions q (n,) rad and velocities qd (n,) rad/s.
 

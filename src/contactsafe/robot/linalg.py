@@ -95,7 +95,13 @@ def dot(x, y):
 def cross(x, y):
     """Give x × y, (3,)."""
     out = np.empty(3)
+    cross_into(x, y, out)
+    return out
+
+
+@njit(cache=True)
+def cross_into(x, y, out):
+    """Write x × y, (3,), to `out`, which is neither of them."""
     out[0] = x[1] * y[2] - x[2] * y[1]
     out[1] = x[2] * y[0] - x[0] * y[2]
     out[2] = x[0] * y[1] - x[1] * y[0]
-    return out
