@@ -1,0 +1,66 @@
+"""Sphinx settings. Build: make docs."""
+
+import os
+import re
+
+# Compiled functions are documented from their Python source.
+os.environ["NUMBA_DISABLE_JIT"] = "1"
+
+import contactsafe
+
+project = "contactsafe"
+author = "the contactsafe authors"
+release = version = contactsafe.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.apidoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+]
+exclude_patterns = ["_build"]
+
+html_theme = "furo"
+html_title = f"contactsafe {release}"
+
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 3
+
+apidoc_modules = [
+    {
+        "path": "../src/contactsafe",
+        "destination": "api",
+        "exclude_patterns": ["../src/contactsafe/cli.py", "../src/contactsafe/__main__.py"],
+        "separate_modules": True,
+        "module_first": True,
+        "max_depth": 1,
+        "automodule_options": {"members", "show-inheritance"},
+    }
+]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_mock_imports = []
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+
+def _plain_text(app, what, name, obj, options, lines):
+    """Take docstrings as plain text: `|x|`, `J_t*` and `x_` are mathematics, not markup."""
+    for index, line in enumerate(lines):
+        parts = re.split(r"(`[^`]*`)", line)
+        parts[::2] = [re.sub(r"([|*])|(?<=\w)(_)(?!\w)", r"\\\g<0>", part) for part in parts[::2]]
+        lines[index] = "".join(parts)
+
+
+def _skip(app, what, name, obj, skip, options):
+    """Leave out what a NamedTuple makes of its fields: they stand under Attributes."""
+    return True if type(obj).__name__ == "_tuplegetter" else None
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", _plain_text, priority=100)
+    app.connect("autodoc-skip-member", _skip)
