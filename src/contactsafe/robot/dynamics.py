@@ -27,7 +27,13 @@ _VIEWED = (
 
 handle_dtype = np.dtype(
     [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass")]
-    + [("site", np.int64), ("first_body", np.int64), ("tool_body", np.int64), ("nbody", np.int64), ("gravity", np.float64, (3,))]
+    + [
+        ("site", np.int64),
+        ("first_body", np.int64),
+        ("tool_body", np.int64),
+        ("nbody", np.int64),
+        ("gravity", np.float64, (3,)),
+    ]
 )
 """Where a compiled function finds one nominal model: addresses of MjModel, MjData and its arrays; body numbers."""
 

@@ -25,6 +25,7 @@ POSITION_TOLERANCE = 1e-4
 ROTATION_TOLERANCE = math.radians(0.01)
 """A pose counts as reached within this, rad."""
 
+_SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
 _STEP = 0.5  # largest change of one joint in one iteration, rad: the linearised arm is worth little beyond
 _DAMPING = 1e-6  # keeps the normal matrix invertible in a singularity; too small to be felt elsewhere
@@ -45,7 +46,7 @@ class InverseKinematics:
         middle = (arm.q_min + arm.q_max) / 2
         spread = np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
-        self._reference = _trac_ik(arm)
+        self._reference = trac_ik(arm)
 
     def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
         """Find joint positions within the limits that put the tool at a pose.
@@ -81,7 +82,7 @@ class InverseKinematics:
                     return q
         raise UnreachableError(
             f"pose at [{', '.join(f'{x:.3f}' for x in position)}] m was not reached: the nearest found is "
-            f"{error_words(*nearest)} away, allowed is {error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
+            f"{_error_words(*nearest)} away, allowed is {_error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
             "move it towards the arm, turn it, or give another q_seed"
         )
 
@@ -91,10 +92,7 @@ class InverseKinematics:
         return q, error
 
 
-_SEEDS = 20
-
-
-def error_words(position_error_m: float, rotation_error_rad: float) -> str:
+def _error_words(position_error_m: float, rotation_error_rad: float) -> str:
     """Write a pose error for a message."""
     return f"{1e3 * position_error_m:.1f} mm and {math.degrees(rotation_error_rad):.2f}°"
 
@@ -105,7 +103,8 @@ def _checked_pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     norm = float(np.linalg.norm(quat))
     if abs(norm - 1) > 1e-3:
         raise InvalidInputError(
-            f"pose.quat has length {norm:.4g}; a unit quaternion w x y z has length 1 within 0.001; divide it by its length"
+            f"pose.quat has length {norm:.4g}; a unit quaternion w x y z has length 1 within 0.001; "
+            "divide it by its length"
         )
     return position, quat / norm
 
@@ -114,21 +113,30 @@ def _reached(error: tuple[float, float]) -> bool:
     return error[0] <= POSITION_TOLERANCE and error[1] <= ROTATION_TOLERANCE
 
 
-def _trac_ik(arm: Arm):
-    """Set up TRAC-IK on the generated URDF; None where it cannot be had."""
+def trac_ik(arm: Arm, timeout_s: float = 0.02):
+    """Set up TRAC-IK (Beeson & Ames 2015, Speed mode) on the generated URDF, with the arm's limits.
+
+    Args:
+        arm: built from facts.
+        timeout_s: how long one call may search, s.
+
+    Returns:
+        `trac_ik.TracIK`, whose `ik(position, rotation, seed)` gives joint positions (n,), rad, or None; or None where
+        TRAC-IK is not installed or the arm came without facts.
+    """
     if TracIK is None or arm.facts is None or arm.tool is None:
         return None
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "arm.urdf"  # TracIK reads a file once, here
+        path = Path(folder) / "arm.urdf"  # TracIK reads a file, once
         path.write_text(arm_urdf(arm.facts, arm.tool), encoding="utf-8")
-        solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=0.02)
-    solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader may leave them open
+        solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=timeout_s)
+    solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader rounds them to single precision
     return solver
 
 
 @njit(cache=True, nogil=True)
 def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
-    """Put the tool at a pose by damped least squares from a seed; no allocation outlives the call, no exception.
+    """Put the tool at a pose by damped least squares from a seed.
 
     Levenberg-Marquardt with damping that grows with the error (Sugihara 2011): far steps are short and
     singularities do no harm, near ones are Gauss-Newton. Each step is the smallest that serves, so the arm's redundant

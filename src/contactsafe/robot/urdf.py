@@ -17,10 +17,11 @@ _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 def arm_urdf(facts: ArmFacts, tool: Tool) -> str:
     """Write the arm with its tool, base frame at the origin.
 
-    Links are `link0` … `link<n>` and `tool`, and the frames without mass `base`, the root, and `tcp`; joints are `joint1` …
-    `joint<n>`, and the fixed `base_mount`, `tool_mount` and `tcp_mount`. URDF has no capsule, so each is a cylinder and two spheres. URDF has no tag for rotor
-    inertia either: add `facts.joint_array("armature")` to the diagonal of an inertia matrix computed from this text,
-    or it will not be the MJCF's. Joint friction is left out too, for URDF's model of it is another one.
+    Links are `link0` … `link<n>` and `tool`, and the frames without mass `base`, the root, and `tcp`; joints are
+    `joint1` … `joint<n>`, and the fixed `base_mount`, `tool_mount` and `tcp_mount`. URDF has no capsule, so each is a
+    cylinder and two spheres. URDF has no tag for rotor inertia either: add `facts.joint_array("armature")` to the
+    diagonal of an inertia matrix computed from this text, or it will not be the MJCF's. Joint friction is left out
+    too, for URDF's model of it is another one.
 
     Args:
         facts: the arm.
