@@ -1,0 +1,15 @@
+"""Contact-safe learned manipulation: a policy moves a torque-controlled arm in contact, and every contact stays gentle."""
+
+from contactsafe.control import presets
+from contactsafe.control.config import ControllerConfig
+from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
+from contactsafe.errors import ContactSafeError
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, Pose
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Arm", "Contact", "ContactSafeError", "Controller", "ControllerConfig", "Measurement", "Output", "Pose", "Target",
+    "presets", "robots",
+]  # fmt: skip

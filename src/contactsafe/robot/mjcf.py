@@ -6,6 +6,8 @@ from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Tool
 
 TOOL_SITE = "tcp"
 FLANGE_SITE = "flange"
+ARM_CONTYPE = 2
+"""Collision type of the arm's geoms: they meet what has conaffinity 2, and never each other."""
 
 
 def numbers(values) -> str:
@@ -36,7 +38,7 @@ def arm_default() -> ET.Element:
     """Give the default class for the arm's geoms: they meet the world, never each other."""
     default = ET.Element("default")
     inner = ET.SubElement(default, "default", {"class": "arm"})
-    ET.SubElement(inner, "geom", contype="2", conaffinity="1", rgba="0.93 0.93 0.95 1", group="2")
+    ET.SubElement(inner, "geom", contype=str(ARM_CONTYPE), conaffinity="1", rgba="0.93 0.93 0.95 1", group="2")
     return default
 
 

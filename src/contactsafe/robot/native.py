@@ -50,6 +50,12 @@ mj_rne = types.ExternalFunction("mj_rne", types.void(*_pp, types.intc, types.CPo
 mj_jacSite = types.ExternalFunction(
     "mj_jacSite", types.void(*_pp, types.CPointer(types.float64), types.CPointer(types.float64), types.intc)
 )
+mj_jac = types.ExternalFunction(
+    "mj_jac",
+    types.void(
+        *_pp, types.CPointer(types.float64), types.CPointer(types.float64), types.CPointer(types.float64), types.intc
+    ),
+)
 mj_step = types.ExternalFunction("mj_step", types.void(*_pp))
 
 

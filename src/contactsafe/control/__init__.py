@@ -1,0 +1,1 @@
+"""The paper and what goes beyond it: laws, observer, supervisor, limits, and the one tick that composes them."""

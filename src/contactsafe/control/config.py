@@ -1,0 +1,94 @@
+"""What a controller can be told: one frozen dataclass, every field with its unit."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+
+
+@dataclass(frozen=True)
+class ControllerConfig:
+    """Parameters of the contact-safe controller. Presets: `contactsafe.presets`.
+
+    Attributes:
+        K_pose: K2, posture stiffness, one a joint (the last repeats or is dropped for other arms), N m/rad.
+        D_pose: D2, posture damping, N m s/rad.
+        contact_aware: switch to the contact-aware law on contact; False is the VICES baseline with a posture task.
+        cancel_tool_wrench: take the measured tool wrench out of the residual, (14), so that it shows the arm alone.
+        observer_gain: K_I of the residual that compensates, 1/s.
+        trigger_gain: K_I of the residual that triggers, names the link and gives the direction, 1/s.
+        residual_cutoff_hz: low-pass behind both residuals, Hz; inf for none.
+        residual_threshold: δ, N m.
+        dwell_s: t_c, least time in contact mode, s.
+        null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
+        contact_damping: damping of every joint while in contact, N m s/rad.
+        push_yield_nm: largest commanded push along the contact while the arm is what ran into something, N m; inf for none.
+        push_hold_nm: the same while something pushes the arm, N m; inf for none.
+        work_memory_s: time over which work exchanged with the contact is remembered, s.
+        work_hold_j: net work received from the contact that tells a pusher from an obstacle, J.
+        work_yield_j: net work put into the contact that tells an obstacle from a pusher, J.
+        friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
+        stiffness_range: allowed K_task, 1/s².
+        damping_range: allowed D_task, 1/s.
+        joint_margin: distance from the joint limits at which the joint stops begin, rad.
+        joint_stop_stiffness: N m/rad.
+        joint_stop_damping: N m s/rad.
+        manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
+        manipulability_damping: λ² at a singularity.
+        torque_rate_fraction: share of the arm's torque-rate limit that is used.
+        dt: tick, s.
+    """
+
+    K_pose: tuple[float, ...] = (40.0, 40.0, 40.0, 40.0, 30.0, 20.0, 10.0)
+    D_pose: tuple[float, ...] = (12.0, 12.0, 12.0, 12.0, 10.0, 8.0, 6.0)
+    contact_aware: bool = True
+    cancel_tool_wrench: bool = True
+    observer_gain: float = 1.5
+    trigger_gain: float = 1.5
+    residual_cutoff_hz: float = 30.0
+    residual_threshold: float = 1.5
+    dwell_s: float = 0.05
+    null_damping: float = 0.0
+    contact_damping: float = 0.0
+    push_yield_nm: float = math.inf
+    push_hold_nm: float = math.inf
+    work_memory_s: float = 0.3
+    work_hold_j: float = 0.02
+    work_yield_j: float = 0.02
+    friction_compensation: bool = True
+    stiffness_range: tuple[float, float] = (10.0, 1500.0)
+    damping_range: tuple[float, float] = (2.0, 120.0)
+    joint_margin: float = 0.1
+    joint_stop_stiffness: float = 200.0
+    joint_stop_damping: float = 30.0
+    manipulability_floor: float = 1e-2
+    manipulability_damping: float = 0.05
+    torque_rate_fraction: float = 0.999
+    dt: float = 0.001
+
+    def __post_init__(self):
+        """Refuse what no controller can mean.
+
+        Raises:
+            InvalidInputError: a field is not a number, negative, or out of order.
+        """
+        for field in fields(self):
+            value = np.asarray(getattr(self, field.name), dtype=float)
+            if np.isnan(value).any() or (value < 0).any():
+                raise InvalidInputError(
+                    f"{field.name} = {getattr(self, field.name)} has a negative number or NaN; give numbers ≥ 0"
+                )
+        for name in ("dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "work_memory_s", "joint_margin"):
+            if getattr(self, name) <= 0:
+                raise InvalidInputError(f"{name} = {getattr(self, name)} must be greater than 0")
+        for name in ("stiffness_range", "damping_range"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise InvalidInputError(f"{name} = ({low}, {high}) is empty; give (lowest, highest)")
+        if self.push_hold_nm < self.push_yield_nm:
+            raise InvalidInputError(
+                f"push_hold_nm = {self.push_hold_nm} is below push_yield_nm = {self.push_yield_nm}; "
+                "the arm may push harder to hold than to yield, never less"
+            )

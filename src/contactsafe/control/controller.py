@@ -1,0 +1,229 @@
+"""The controller for Python callers: checked at the door, then one compiled tick."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contactsafe.control.config import ControllerConfig
+from contactsafe.control.presets import safe
+from contactsafe.control.records import CONTACT, FAULTS, controller_dtype, fill_params
+from contactsafe.control.tick import control_tick
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.arm import Arm, Pose, finite_array
+from contactsafe.robot.ik import InverseKinematics
+
+
+class Measurement(NamedTuple):
+    """What the sensors say at one tick.
+
+    Attributes:
+        q: joint positions, (n,), rad.
+        qd: joint velocities, (n,), rad/s.
+        wrench_ee: wrench of the environment on the end effector at the tool point, world axes, (6,), N and N m;
+            None without a force sensor.
+    """
+
+    q: np.ndarray
+    qd: np.ndarray
+    wrench_ee: np.ndarray | None = None
+
+
+class Target(NamedTuple):
+    """What a policy asks for; held until the next.
+
+    Attributes:
+        pose: desired tool pose, world.
+        stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
+        damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
+        posture: null-space joint reference, (n,), rad; None to take inverse kinematics of `pose`.
+    """
+
+    pose: Pose
+    stiffness: np.ndarray
+    damping: np.ndarray | None = None
+    posture: np.ndarray | None = None
+
+
+class Contact(NamedTuple):
+    """What is known of a contact on the arm.
+
+    Attributes:
+        in_contact: whether the contact-aware law is in force.
+        link: furthest link whose joint residual exceeds the threshold, 1 … n; 0 for none.
+        holding: whether the contact was found to push the arm rather than to stand in its way.
+        torque: estimated joint torque of the contact, (n,), N m (the triggering residual).
+    """
+
+    in_contact: bool
+    link: int
+    holding: bool
+    torque: np.ndarray
+
+
+class Output(NamedTuple):
+    """What one tick gives back.
+
+    Attributes:
+        torque: joint command including gravity, (n,), N m.
+        contact: on the arm.
+        residual: estimated external joint torque the law compensates, (n,), N m.
+        error: x_d − x, position and rotation vector, (6,), m and rad.
+        limited: whether a torque or torque-rate limit clipped the command.
+        fault: 'none', or the first reason since reset why a number was refused.
+    """
+
+    torque: np.ndarray
+    contact: Contact
+    residual: np.ndarray
+    error: np.ndarray
+    limited: bool
+    fault: str
+
+
+class Controller:
+    """A contact-safe Cartesian variable impedance controller for one arm.
+
+    Args:
+        arm: `contactsafe.robots.panda()` or another.
+        config: a preset such as `contactsafe.presets.safe()`, the default.
+        record: a `controller_dtype` record to live in, such as one of an array of many; its own where None.
+
+    Attributes:
+        record: everything the controller is made of; copy its `state` to save it.
+    """
+
+    def __init__(self, arm: Arm, config: ControllerConfig | None = None, record: np.void | None = None):
+        if not isinstance(arm, Arm):
+            raise InvalidInputError(f"arm is {type(arm).__name__}; give an Arm such as contactsafe.robots.panda()")
+        config = safe() if config is None else config
+        if not isinstance(config, ControllerConfig):
+            raise InvalidInputError(
+                f"config is {type(config).__name__}; give a ControllerConfig such as contactsafe.presets.safe()"
+            )
+        self.arm = arm
+        self.config = config
+        self._nominal = arm.nominal()
+        self._ik = InverseKinematics(arm)
+        self.record = np.zeros(1, dtype=controller_dtype(arm.n))[0] if record is None else record
+        self.record["handle"] = self._nominal.handle
+        fill_params(self.record["params"], config, arm)
+        self._last_target: Target | None = None
+        self._is_reset = False
+
+    def reset(self, q) -> None:
+        """Forget everything and hold the present pose.
+
+        Args:
+            q: measured joint positions, (n,), rad.
+
+        Raises:
+            InvalidInputError: q has the wrong shape, is not finite, or lies outside the joint range.
+        """
+        q = self.arm.joint_vector(q, "q")
+        outside = (q < self.arm.q_min) | (q > self.arm.q_max)
+        if outside.any():
+            i = int(np.argmax(outside))
+            raise InvalidInputError(
+                f"q[{i}] = {q[i]:.4f} rad is outside [{self.arm.q_min[i]:.4f}, {self.arm.q_max[i]:.4f}]; "
+                "give measured joint positions in radians"
+            )
+        self.record["state"] = np.zeros((), dtype=self.record["state"].dtype)
+        pose = self.arm.tool_pose(q)
+        held = self.record["state"]["target"]
+        held["position"], held["quat"], held["q_pose"] = pose.position, pose.quat, q
+        held["K_task"], held["D_task"] = 150.0, 2.0 * math.sqrt(150.0)
+        self.record["target"] = held
+        self._last_target = None
+        self._is_reset = True
+
+    def step(self, measurement: Measurement, target: Target) -> Output:
+        """Run one tick of 1 ms.
+
+        A target that is the very object of the last call is not checked again.
+
+        Raises:
+            InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
+            UnreachableError: no posture was given and none reaches the pose.
+        """
+        if not self._is_reset:
+            raise InvalidInputError("the controller was not reset; call reset(q) with the measured joint positions first")
+        if target is not self._last_target:
+            self.set_target(target)
+            self._last_target = target
+        self._set_measurement(measurement)
+        control_tick(self.record)
+        return self._output()
+
+    def set_target(self, target: Target) -> None:
+        """Check a target and make it the one in force; on error the last one stays."""
+        record = self.record["target"]
+        position = finite_array(target.pose.position, (3,), "pose.position")
+        quat = unit_quaternion(target.pose.quat, "pose.quat")
+        stiffness = self._gain(target.stiffness, "stiffness", "1/s²", self.config.stiffness_range)
+        damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
+        damping = self._gain(damping, "damping", "1/s", self.config.damping_range)
+        if target.posture is None:
+            posture = self._ik.solve(Pose(position, quat), record["q_pose"].copy())
+        else:
+            posture = self.arm.joint_vector(target.posture, "posture")
+        record["position"], record["quat"], record["q_pose"] = position, quat, posture
+        record["K_task"], record["D_task"] = stiffness, damping
+
+    def _gain(self, value, name: str, unit: str, allowed: tuple[float, float]) -> np.ndarray:
+        gain = finite_array(value, (6,), name)
+        low, high = allowed
+        outside = (gain < low) | (gain > high)
+        if outside.any():
+            i = int(np.argmax(outside))
+            raise InvalidInputError(
+                f"{name}[{i}] = {gain[i]:g} {unit} is outside [{low:g}, {high:g}]; "
+                f"scale it or widen ControllerConfig.{name}_range"
+            )
+        return gain
+
+    def _set_measurement(self, measurement: Measurement) -> None:
+        record = self.record["measurement"]
+        record["q"] = _shaped(measurement.q, self.arm.n, "q")
+        record["qd"] = _shaped(measurement.qd, self.arm.n, "qd")
+        record["has_wrench"] = measurement.wrench_ee is not None
+        if measurement.wrench_ee is not None:
+            record["wrench_ee"] = _shaped(measurement.wrench_ee, 6, "wrench_ee")
+
+    def _output(self) -> Output:
+        out, state = self.record["output"], self.record["state"]
+        contact = Contact(
+            in_contact=bool(out["mode"] == CONTACT),
+            link=int(out["link"]),
+            holding=bool(out["holding"]),
+            torque=state["residual_trigger"].copy(),
+        )
+        return Output(
+            torque=out["torque"].copy(),
+            contact=contact,
+            residual=out["residual"].copy(),
+            error=out["error"].copy(),
+            limited=bool(out["limited"]),
+            fault=FAULTS[int(out["fault"])],
+        )
+
+
+def _shaped(value, n: int, name: str) -> np.ndarray:
+    """Check a measurement's shape only: numbers that are not finite are the tick's to refuse, the arm must not drop."""
+    array = np.asarray(value, dtype=float)
+    if array.shape != (n,):
+        raise InvalidInputError(f"{name} has shape {array.shape}; give {n} numbers")
+    return array
+
+
+def unit_quaternion(value, name: str) -> np.ndarray:
+    """Check a quaternion w x y z to 1e-3 of unit length and normalise it, (4,).
+
+    Raises:
+        InvalidInputError: not four finite numbers, or not of unit length.
+    """
+    quat = finite_array(value, (4,), name)
+    norm = float(np.linalg.norm(quat))
+    if abs(norm - 1.0) > 1e-3:
+        raise InvalidInputError(f"{name} has length {norm:.4g}; give a unit quaternion w x y z (divide by its length)")
+    return quat / norm

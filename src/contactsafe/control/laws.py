@@ -1,0 +1,232 @@
+"""The control laws: pure, compiled, one equation each. Numbers in brackets are equations of the paper.
+
+The paper is Zhu, Kang, Chen, "A Contact-Safe Reinforcement Learning Framework for Contact-Rich Robot Manipulation";
+signs follow `M q̈ + c + g = tau_m + tau_ext`, tau_ext being what the environment exerts on the robot.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t, spd_inverse
+from contactsafe.robot.rotation import orientation_error
+
+
+@njit(cache=True)
+def task_inertia(J, M_inv, manipulability_floor, damping_max):
+    """Give Λ = (J M⁻¹ Jᵀ)⁻¹, damped where the arm loses a direction.
+
+    Below a floor of manipulability w = det(J M⁻¹ Jᵀ) a term λ² I is added before inverting, growing smoothly from zero
+    as (1 − w/w₀)² (Nakamura & Hanafusa 1986): the force asked along a lost direction stays finite.
+
+    Args:
+        J: task Jacobian, (6, n).
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        manipulability_floor: w₀, in the units of the determinant.
+        damping_max: λ² at w = 0, 1/kg and 1/(kg m²).
+
+    Returns:
+        Λ, (6, 6), kg and kg m²; and J M⁻¹, (6, n).
+    """
+    J_M_inv = matmul(J, M_inv)
+    inverse = matmul(J_M_inv, J.T)
+    w = max(_determinant(inverse), 0.0)
+    if w < manipulability_floor:
+        damping = damping_max * (1.0 - w / manipulability_floor) ** 2
+        for i in range(6):
+            inverse[i, i] += damping
+    Lambda = np.zeros((6, 6))
+    spd_inverse(inverse, Lambda)
+    return Lambda, J_M_inv
+
+
+@njit(cache=True)
+def _determinant(A):
+    """Determinant of a symmetric positive semi-definite matrix, by Cholesky's pivots; 0 where one is not positive."""
+    n = A.shape[0]
+    L = A.copy()
+    det = 1.0
+    for k in range(n):
+        pivot = L[k, k]
+        if not pivot > 0.0:
+            return 0.0
+        det *= pivot
+        for i in range(k + 1, n):
+            factor = L[i, k] / pivot
+            for j in range(k + 1, n):
+                L[i, j] -= factor * L[k, j]
+    return det
+
+
+@njit(cache=True)
+def impedance_wrench(Lambda, error, velocity, Jdot_qd, K_task, D_task):
+    """Give F_t without gravity and Coriolis terms, (4): Λ (K e − D ẋ − J̇ q̇).
+
+    Args:
+        Lambda: task inertia, (6, 6).
+        error: x_d − x, position then rotation vector, (6,), m and rad.
+        velocity: of the tool, (6,), m/s and rad/s.
+        Jdot_qd: J̇ q̇, (6,).
+        K_task: stiffness per unit task inertia, (6,), 1/s².
+        D_task: damping per unit task inertia, (6,), 1/s.
+
+    Returns:
+        Wrench, (6,), N and N m.
+    """
+    acceleration = np.empty(6)
+    for i in range(6):
+        acceleration[i] = K_task[i] * error[i] - D_task[i] * velocity[i] - Jdot_qd[i]
+    return matvec(Lambda, acceleration)
+
+
+@njit(cache=True)
+def task_error(position_d, quat_d, position, rotation):
+    """Give x_d − x: position difference, then rotation vector of R_d Rᵀ, world axes, (6,), m and rad."""
+    error = np.empty(6)
+    rotvec = orientation_error(quat_d, rotation)
+    for i in range(3):
+        error[i] = position_d[i] - position[i]
+        error[3 + i] = rotvec[i]
+    return error
+
+
+@njit(cache=True)
+def posture_torque(q_pose, q, qd, K_pose, D_pose):
+    """Give Γ_pose = K2 (q_pose − q) − D2 q̇, (15), (n,), N m."""
+    out = np.empty(q.shape[0])
+    for i in range(q.shape[0]):
+        out[i] = K_pose[i] * (q_pose[i] - q[i]) - D_pose[i] * qd[i]
+    return out
+
+
+@njit(cache=True)
+def task_nullspace(J, J_bar):
+    """Give N_t = I − J# J, (16), (n, n); J_bar is the dynamically consistent inverse M⁻¹ Jᵀ Λ, (n, 6)."""
+    N = matmul(J_bar, J)
+    for i in range(N.shape[0]):
+        for j in range(N.shape[1]):
+            N[i, j] = -N[i, j]
+        N[i, i] += 1.0
+    return N
+
+
+@njit(cache=True)
+def contact_nullspace(N_t, M_inv, residual):
+    """Remove the contact direction from the task null space.
+
+    N_ct = N_t (I − a# a) with a = residualᵀ N_t and a# = M⁻¹ aᵀ / (a M⁻¹ aᵀ), (21). The printed law is 0/0 where the
+    contact lies wholly in task directions; there N_ct = N_t.
+
+    Args:
+        N_t: task null-space projector, (n, n).
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        residual: contact torque on the arm, (n,), N m.
+
+    Returns:
+        Projector, (n, n).
+    """
+    a = matvec_t(N_t, residual)
+    M_inv_a = matvec(M_inv, a)
+    a_M_inv_a = dot(a, M_inv_a)
+    N_ct = N_t.copy()
+    if a_M_inv_a <= 1e-6 * dot(residual, matvec(M_inv, residual)):
+        return N_ct
+    N_t_a_sharp = matvec(N_t, M_inv_a)
+    for i in range(a.shape[0]):
+        for j in range(a.shape[0]):
+            N_ct[i, j] -= N_t_a_sharp[i] * a[j] / a_M_inv_a
+    return N_ct
+
+
+@njit(cache=True)
+def push_along(direction, M_inv, tau_net):
+    """Give the torque with which a command pushes against a contact, N m.
+
+    s = −a M⁻¹ tau_net / (a M⁻¹ aᵀ): the commanded acceleration against the contact, as a torque along it.
+
+    Args:
+        direction: unit joint-space direction of the contact torque on the arm, (n,).
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        tau_net: commanded torque less c and g, (n,), N m.
+    """
+    M_inv_a = matvec(M_inv, direction)
+    return -dot(M_inv_a, tau_net) / dot(direction, M_inv_a)
+
+
+@njit(cache=True)
+def momentum(M, qd):
+    """Give p = M q̇, (10), (n,), kg m²/s."""
+    return matvec(M, qd)
+
+
+@njit(cache=True)
+def observer_gain(gain, dt):
+    """Give 1 − exp(−K dt), the share of a step that a first-order observer of gain K (1/s) takes up in one tick."""
+    return 1.0 - math.exp(-gain * dt)
+
+
+@njit(cache=True)
+def observer_step(residual, share, tau_external):
+    """Advance the momentum observer in place by one tick, (12)-(14).
+
+    r ← r + (1 − exp(−K dt)) (tau_external − r), where tau_external = Δp/dt − (tau_m + Jᵀ w − β) is the raw external
+    torque of the last tick. It is the paper's integral form solved exactly for a torque constant over the tick;
+    without a stored integral it neither drifts nor jumps when K changes.
+
+    Args:
+        residual: (n,), N m; updated.
+        share: `observer_gain`.
+        tau_external: (n,), N m.
+    """
+    for i in range(residual.shape[0]):
+        residual[i] += share * (tau_external[i] - residual[i])
+
+
+@njit(cache=True)
+def joint_stop_torque(q, qd, q_min, q_max, margin, stiffness, damping):
+    """Push joints back that come within a margin of their range: a one-sided spring and damper.
+
+    Args:
+        q, qd: (n,), rad and rad/s.
+        q_min, q_max: range, (n,), rad.
+        margin: rad.
+        stiffness: N m/rad of intrusion.
+        damping: N m s/rad, only against motion towards the limit, rising over the margin.
+
+    Returns:
+        Torque, (n,), N m; zero away from the limits.
+    """
+    out = np.zeros(q.shape[0])
+    for i in range(q.shape[0]):
+        low = q_min[i] + margin - q[i]
+        high = q[i] - (q_max[i] - margin)
+        if low > 0.0:
+            out[i] = stiffness * low - damping * min(low / margin, 1.0) * min(qd[i], 0.0)
+        elif high > 0.0:
+            out[i] = -stiffness * high - damping * min(high / margin, 1.0) * max(qd[i], 0.0)
+    return out
+
+
+@njit(cache=True)
+def limit_torque(tau, tau_previous, tau_max, step_max):
+    """Clip a command in place to the torque limits and to a largest change per tick.
+
+    Args:
+        tau: command, (n,), N m; updated.
+        tau_previous: last command sent, (n,), N m.
+        tau_max: (n,), N m.
+        step_max: N m per tick.
+
+    Returns:
+        True where anything was clipped.
+    """
+    clipped = False
+    for i in range(tau.shape[0]):
+        low = max(-tau_max[i], tau_previous[i] - step_max)
+        high = min(tau_max[i], tau_previous[i] + step_max)
+        value = min(max(tau[i], low), high)
+        if value != tau[i]:
+            clipped = True
+        tau[i] = value
+    return clipped

@@ -1,0 +1,59 @@
+"""Three controllers by name: the baseline, the paper, and the default."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from contactsafe.control.config import ControllerConfig
+from contactsafe.errors import InvalidInputError
+
+__all__ = ["PRESETS", "by_name", "paper", "safe", "vices"]
+
+
+def paper() -> ControllerConfig:
+    """Give the controller of the paper with its parameters: K_I 1.5 1/s, δ 1.5 N m, t_c 50 ms, K2 and D2 as printed.
+
+    The cut-off of the residual's low-pass is not printed; 30 Hz lies far above K_I.
+    """
+    return ControllerConfig()
+
+
+def vices() -> ControllerConfig:
+    """Give the baseline: variable impedance control with a posture task and the same parameters, blind to arm contact.
+
+    Martín-Martín et al. 2019, with the posture task the paper adds to it. Its residual is computed and reported only.
+    """
+    return replace(paper(), contact_aware=False)
+
+
+def safe() -> ControllerConfig:
+    """Give the default: `paper()` with null-space damping, a fast trigger and a bounded push.
+
+    A fast residual triggers and compensates; damping stays in the null-space direction that the contact removes; and
+    the command never pushes along the contact harder than a bound, low where the arm ran into something, higher where
+    something pushes the arm.
+    """
+    return replace(
+        paper(),
+        observer_gain=50.0,
+        trigger_gain=50.0,
+        residual_cutoff_hz=100.0,
+        residual_threshold=2.0,
+        null_damping=3.0,
+        contact_damping=2.0,
+        push_yield_nm=3.0,
+        push_hold_nm=22.0,
+    )
+
+
+PRESETS: dict[str, Callable[[], ControllerConfig]] = {"vices": vices, "paper": paper, "safe": safe}
+
+
+def by_name(name: str) -> ControllerConfig:
+    """Look a preset up by its name.
+
+    Raises:
+        InvalidInputError: no such preset.
+    """
+    if name not in PRESETS:
+        raise InvalidInputError(f"controller '{name}' is unknown; choose from {', '.join(PRESETS)}")
+    return PRESETS[name]()

@@ -1,0 +1,160 @@
+"""State is data: everything a controller is made of, as NumPy records that compiled code reads by name.
+
+One controller is one record of `controller_dtype(n)`; many are an array of them; its state is saved by copying it.
+"""
+
+import math
+
+import numpy as np
+
+from contactsafe.control.config import ControllerConfig
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.dynamics import dynamics_dtype, handle_dtype
+
+_f = np.float64
+_i = np.int64
+
+FREE, CONTACT = 0, 1
+"""Modes of the supervisor."""
+
+FAULTS = {
+    0: "none",
+    1: "measurement is not finite; the last torque was repeated",
+    2: "target is not finite; the last good target holds",
+    3: "target quaternion is not of unit length; the last good target holds",
+    4: "target stiffness or damping is out of range; the last good target holds",
+    5: "measurements stayed unusable for 20 ticks; gravity compensation only",
+}
+"""What `fault` in the state and output means; the first one is latched until reset."""
+
+
+def measurement_dtype(n: int) -> np.dtype:
+    """Describe what sensors give each tick."""
+    return np.dtype(
+        [
+            ("q", _f, (n,)),  # rad
+            ("qd", _f, (n,)),  # rad/s
+            ("wrench_ee", _f, (6,)),  # environment on end effector, at the tool point, world axes, N and N m
+            ("has_wrench", _i),  # 0 where no force sensor is there
+        ]
+    )
+
+
+def target_dtype(n: int) -> np.dtype:
+    """Describe what a policy asks for."""
+    return np.dtype(
+        [
+            ("position", _f, (3,)),  # m
+            ("quat", _f, (4,)),  # w x y z
+            ("K_task", _f, (6,)),  # 1/s²
+            ("D_task", _f, (6,)),  # 1/s
+            ("q_pose", _f, (n,)),  # rad
+        ]
+    )
+
+
+def params_dtype(n: int) -> np.dtype:
+    """Describe a configuration resolved for one arm: per-joint arrays, per-tick factors."""
+    scalars = (
+        "trigger_share", "observer_share", "lowpass_share", "residual_threshold", "null_damping", "contact_damping",
+        "push_yield_nm", "push_hold_nm", "work_keep", "work_hold_j", "work_yield_j",
+        "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin", "joint_stop_stiffness",
+        "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step", "dt",
+    )  # fmt: skip
+    return np.dtype(
+        [(name, _f) for name in scalars]
+        + [(name, _i) for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks")]
+        + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
+        + [("friction", _f, (n, 3))]
+    )
+
+
+def state_dtype(n: int) -> np.dtype:
+    """Describe what a controller remembers from tick to tick."""
+    return np.dtype(
+        [
+            ("started", _i),  # 0 before the first tick after a reset
+            ("momentum", _f, (n,)),  # at the last tick, kg m²/s
+            ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
+            ("observed", _f, (n,)),  # residual before its low-pass, compensating observer, N m
+            ("observed_trigger", _f, (n,)),  # the same, triggering observer, N m
+            ("residual", _f, (n,)),  # N m
+            ("residual_trigger", _f, (n,)),  # N m
+            ("tau", _f, (n,)),  # last command sent, N m
+            ("friction", _f, (n,)),  # friction torque contained in it, N m
+            ("target", target_dtype(n)),  # last good target
+            ("mode", _i),
+            ("mode_ticks", _i),  # ticks spent in the mode
+            ("work_j", _f),  # net work received from the contact, fading, J
+            ("holding", _i),  # 1 while something pushes the arm
+            ("fault", _i),  # first fault since reset
+            ("bad_ticks", _i),  # unusable measurements in a row
+        ]
+    )
+
+
+def output_dtype(n: int) -> np.dtype:
+    """Describe what a tick reports."""
+    return np.dtype(
+        [
+            ("torque", _f, (n,)),  # command, N m
+            ("residual", _f, (n,)),  # compensating, N m
+            ("residual_trigger", _f, (n,)),  # N m
+            ("error", _f, (6,)),  # x_d − x, m and rad
+            ("position", _f, (3,)),  # of the tool, m
+            ("rotation", _f, (3, 3)),
+            ("velocity", _f, (6,)),  # of the tool
+            ("mode", _i),
+            ("holding", _i),
+            ("link", _i),  # 1 … n, 0 for none
+            ("push_nm", _f),  # commanded push along the contact before the bound, N m
+            ("push_limit_nm", _f),  # the bound in force; inf where there is none
+            ("limited", _i),  # 1 where torque or torque rate was clipped
+            ("fault", _i),
+        ]
+    )
+
+
+def controller_dtype(n: int) -> np.dtype:
+    """Describe one whole controller for an arm of n joints."""
+    return np.dtype(
+        [
+            ("handle", handle_dtype),
+            ("params", params_dtype(n)),
+            ("state", state_dtype(n)),
+            ("measurement", measurement_dtype(n)),
+            ("target", target_dtype(n)),
+            ("dynamics", dynamics_dtype(n)),
+            ("output", output_dtype(n)),
+        ],
+        align=True,
+    )
+
+
+def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
+    """Resolve a configuration for an arm into a `params_dtype` record."""
+    dt = config.dt
+    for name in (
+        "residual_threshold", "null_damping", "contact_damping", "push_yield_nm", "push_hold_nm", "work_hold_j",
+        "work_yield_j", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
+        "manipulability_floor", "manipulability_damping", "dt", "contact_aware", "cancel_tool_wrench",
+        "friction_compensation",
+    ):  # fmt: skip
+        params[name] = getattr(config, name)
+    params["trigger_share"] = 1.0 - math.exp(-config.trigger_gain * dt)
+    params["observer_share"] = 1.0 - math.exp(-config.observer_gain * dt)
+    params["lowpass_share"] = 1.0 - math.exp(-2.0 * math.pi * config.residual_cutoff_hz * dt)
+    params["work_keep"] = math.exp(-dt / config.work_memory_s)
+    params["stiffness_min"], params["stiffness_max"] = config.stiffness_range
+    params["damping_min"], params["damping_max"] = config.damping_range
+    params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt
+    params["dwell_ticks"] = round(config.dwell_s / dt)
+    params["K_pose"] = _per_joint(config.K_pose, arm.n)
+    params["D_pose"] = _per_joint(config.D_pose, arm.n)
+    params["q_min"], params["q_max"] = arm.q_min, arm.q_max
+    params["tau_max"], params["friction"] = arm.tau_max, arm.friction
+
+
+def _per_joint(values: tuple[float, ...], n: int) -> np.ndarray:
+    """Fit a list of gains to n joints: drop what is too much, repeat the last."""
+    return np.array([values[min(i, len(values) - 1)] for i in range(n)])

@@ -1,0 +1,251 @@
+"""One control tick: measurement and target in, torque out. Nothing else in this package computes a torque."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from contactsafe.control.laws import (
+    contact_nullspace,
+    impedance_wrench,
+    joint_stop_torque,
+    limit_torque,
+    momentum,
+    observer_step,
+    posture_torque,
+    push_along,
+    task_error,
+    task_inertia,
+    task_nullspace,
+)
+from contactsafe.control.records import CONTACT, FREE
+from contactsafe.robot.dynamics import update_dynamics
+from contactsafe.robot.friction import joint_friction
+from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
+
+_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
+_LOST_AFTER_TICKS = 20
+
+
+@njit(cache=True, nogil=True)
+def control_tick(c):
+    """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
+
+    Order: refuse bad numbers, nominal dynamics, observer, supervisor, law, push bound, friction and joint stops,
+    limits. Bad numbers never raise: the last good target or torque holds and `fault` says why.
+    """
+    if not _measurement_is_finite(c.measurement):
+        _tick_without_measurement(c)
+        return
+    c.state.bad_ticks = 0
+    _accept_target(c)
+    update_dynamics(c.handle, c.measurement.q, c.measurement.qd, c.dynamics)
+    if c.state.started == 0:
+        _start(c)
+    _observe(c)
+    _supervise(c)
+    tau = _law(c)
+    _finish(c, tau)
+
+
+@njit(cache=True)
+def _all_finite(x):
+    for i in range(x.shape[0]):
+        if not math.isfinite(x[i]):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _measurement_is_finite(m):
+    wrench_ok = m.has_wrench == 0 or _all_finite(m.wrench_ee)
+    return wrench_ok and _all_finite(m.q) and _all_finite(m.qd)
+
+
+@njit(cache=True)
+def _latch(state, fault):
+    if state.fault == 0:
+        state.fault = fault
+
+
+@njit(cache=True)
+def _tick_without_measurement(c):
+    """Repeat the last torque, as the robot itself does for a lost packet; after 20 ticks fall back to gravity."""
+    state = c.state
+    _latch(state, _BAD_MEASUREMENT)
+    state.bad_ticks += 1
+    if state.bad_ticks > _LOST_AFTER_TICKS:
+        state.fault = _LOST
+        tau = c.dynamics.g.copy()
+        limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step)
+        state.tau[:] = tau
+    c.output.torque[:] = state.tau
+    c.output.fault = state.fault
+
+
+@njit(cache=True)
+def _target_fault(target, params):
+    finite = _all_finite(target.position) and _all_finite(target.quat) and _all_finite(target.q_pose)
+    if not (finite and _all_finite(target.K_task) and _all_finite(target.D_task)):
+        return _BAD_TARGET
+    if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
+        return _BAD_QUATERNION
+    for i in range(6):
+        K, D = target.K_task[i], target.D_task[i]
+        if K < params.stiffness_min or K > params.stiffness_max or D < params.damping_min or D > params.damping_max:
+            return _BAD_GAIN
+    return 0
+
+
+@njit(cache=True)
+def _accept_target(c):
+    """Take the target over where it is sound; latch the reason where it is not."""
+    fault = _target_fault(c.target, c.params)
+    if fault != 0:
+        _latch(c.state, fault)
+        return
+    held = c.state.target
+    norm = math.sqrt(dot(c.target.quat, c.target.quat))
+    for i in range(4):
+        held.quat[i] = c.target.quat[i] / norm
+    held.position[:] = c.target.position
+    held.K_task[:] = c.target.K_task
+    held.D_task[:] = c.target.D_task
+    held.q_pose[:] = c.target.q_pose
+
+
+@njit(cache=True)
+def _start(c):
+    """Begin at rest: momentum as measured, command at gravity, so that nothing jumps."""
+    state, dynamics = c.state, c.dynamics
+    state.started = 1
+    state.momentum[:] = momentum(dynamics.M, c.measurement.qd)
+    for i in range(state.beta.shape[0]):
+        state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
+        # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
+        state.tau[i] = state.beta[i]
+
+
+@njit(cache=True)
+def _observe(c):
+    """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14)."""
+    state, dynamics, params = c.state, c.dynamics, c.params
+    n = state.tau.shape[0]
+    p = momentum(dynamics.M, c.measurement.qd)
+    tau_external = np.empty(n)
+    for i in range(n):
+        beta = dynamics.g[i] - dynamics.CT_qd[i]
+        applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
+        tau_external[i] = (p[i] - state.momentum[i]) / params.dt - applied
+        state.beta[i] = beta
+        state.momentum[i] = p[i]
+    if c.measurement.has_wrench != 0 and params.cancel_tool_wrench != 0:
+        tau_tool = matvec_t(dynamics.J, c.measurement.wrench_ee)
+        for i in range(n):
+            tau_external[i] -= tau_tool[i]
+    observer_step(state.observed, params.observer_share, tau_external)
+    observer_step(state.observed_trigger, params.trigger_share, tau_external)
+    observer_step(state.residual, params.lowpass_share, state.observed)
+    observer_step(state.residual_trigger, params.lowpass_share, state.observed_trigger)
+
+
+@njit(cache=True)
+def _link_in_contact(residual, threshold):
+    """Give the furthest joint from the base whose residual exceeds the threshold, 1 … n; 0 for none."""
+    for i in range(residual.shape[0] - 1, -1, -1):
+        if abs(residual[i]) > threshold:
+            return i + 1
+    return 0
+
+
+@njit(cache=True)
+def _supervise(c):
+    """Choose the mode, with dwell; while in contact, tell a pusher from an obstacle by who has done the work.
+
+    A passive obstacle never gives back more than was put into it, so only a net gain of work marks a pusher.
+    """
+    state, params = c.state, c.params
+    link = _link_in_contact(state.residual_trigger, params.residual_threshold)
+    state.mode_ticks += 1
+    if state.mode == FREE:
+        if link != 0 and params.contact_aware != 0:
+            state.mode, state.mode_ticks = CONTACT, 0
+            state.work_j, state.holding = 0.0, 0
+    elif link == 0 and state.mode_ticks >= params.dwell_ticks:
+        state.mode, state.mode_ticks = FREE, 0
+        state.work_j, state.holding = 0.0, 0
+    if state.mode == CONTACT:
+        power = dot(state.residual_trigger, c.measurement.qd)
+        state.work_j = params.work_keep * state.work_j + power * params.dt
+        if state.work_j > params.work_hold_j:
+            state.holding = 1
+        elif state.work_j < -params.work_yield_j:
+            state.holding = 0
+    c.output.link = link
+
+
+@njit(cache=True)
+def _law(c):
+    """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m."""
+    state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
+    q, qd = c.measurement.q, c.measurement.qd
+    Lambda, J_M_inv = task_inertia(
+        dynamics.J, dynamics.M_inv, params.manipulability_floor, params.manipulability_damping
+    )
+    J_bar = matmul(J_M_inv.T, Lambda)
+    error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
+    F = impedance_wrench(Lambda, error, dynamics.velocity, dynamics.Jdot_qd, target.K_task, target.D_task)
+    N_t = task_nullspace(dynamics.J, J_bar)
+    tau_pose = posture_torque(target.q_pose, q, qd, params.K_pose, params.D_pose)
+    c.output.error[:] = error
+    c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
+    if state.mode == FREE:
+        tau_net = matvec_t(dynamics.J, F) + matvec_t(N_t, tau_pose)
+    else:
+        tau_net = _contact_law(c, F, J_bar, N_t, tau_pose)
+    return tau_net + dynamics.c + dynamics.g
+
+
+@njit(cache=True)
+def _contact_law(c, F, J_bar, N_t, tau_pose):
+    """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, damped in the direction taken out, and never pushing beyond the bound."""
+    state, dynamics, params = c.state, c.dynamics, c.params
+    qd = c.measurement.qd
+    F_tc = F - matvec_t(J_bar, state.residual)
+    N_ct = contact_nullspace(N_t, dynamics.M_inv, state.residual)
+    tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
+    tau -= params.null_damping * matvec_t(N_t - N_ct, qd)
+    tau -= params.contact_damping * qd
+    limit = params.push_hold_nm if state.holding != 0 else params.push_yield_nm
+    norm = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
+    if norm > 0.0:
+        direction = state.residual_trigger / norm
+        push = push_along(direction, dynamics.M_inv, tau)
+        c.output.push_nm, c.output.push_limit_nm = push, limit
+        if push > limit:
+            tau += (push - limit) * direction
+    return tau
+
+
+@njit(cache=True)
+def _finish(c, tau):
+    """Add friction compensation and joint stops, apply the limits, remember and report."""
+    state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
+    q, qd = c.measurement.q, c.measurement.qd
+    tau += joint_stop_torque(
+        q, qd, params.q_min, params.q_max, params.joint_margin, params.joint_stop_stiffness, params.joint_stop_damping
+    )
+    friction = np.zeros(q.shape[0])
+    if params.friction_compensation != 0:
+        friction = joint_friction(params.friction, qd)
+        tau += friction
+    out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
+    state.tau[:] = tau
+    state.friction[:] = friction
+    out.torque[:] = tau
+    out.residual[:] = state.residual
+    out.residual_trigger[:] = state.residual_trigger
+    out.position[:] = dynamics.position
+    out.rotation[:] = dynamics.rotation
+    out.velocity[:] = dynamics.velocity
+    out.mode, out.holding, out.fault = state.mode, state.holding, state.fault

@@ -1,0 +1,1 @@
+"""The world: scene, whiteboard and ink, camera, obstacles, sensing and plant errors, native stepping."""

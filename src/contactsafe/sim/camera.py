@@ -1,0 +1,222 @@
+"""What the camera sees: the segmented mask of the board, ink 0 and everything else 255, by homography.
+
+The board is a plane, so a pixel of the mask is a place on the board: each inked cell marks the pixels its corners fall
+in. The arm stands before the board: a marked pixel whose line of sight meets one of the arm's shapes is unmarked.
+"""
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from contactsafe.robot.mjcf import ARM_CONTYPE
+from contactsafe.robot.native import view2
+from contactsafe.sim.config import Camera
+from contactsafe.sim.whiteboard import Whiteboard
+
+INK_PIXEL, OTHER_PIXEL = 0, 255
+
+
+def camera_axes(camera: Camera) -> np.ndarray:
+    """Give the camera's axes in the world, columns right, down, forward, (3, 3)."""
+    forward = np.array(camera.target) - np.array(camera.position)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(forward, right), forward])
+
+
+def plane_homography(camera: Camera, z: float) -> np.ndarray:
+    """Give H with (u, v, 1) ~ H (x, y, 1) for points of the world plane at height z.
+
+    Args:
+        camera: the camera.
+        z: m.
+
+    Returns:
+        (3, 3); u is the column, v the row; the middle of pixel (0, 0) is (0.5, 0.5).
+    """
+    R = camera_axes(camera).T
+    t = -R @ np.array(camera.position)
+    K = np.array([[camera.focal_px, 0.0, camera.size / 2], [0.0, camera.focal_px, camera.size / 2], [0.0, 0.0, 1.0]])
+    return K @ np.column_stack([R[:, 0], R[:, 1], R[:, 2] * z + t])
+
+
+class CameraTables(NamedTuple):
+    """What drawing a mask needs to know of camera and board, computed once for both.
+
+    Attributes:
+        pixels: number of the pixel each corner of each cell falls in, −1 outside, (rows, columns, 4).
+        rays: unit line of sight of each pixel, world, (size, size, 3).
+        distance: along it to the board's plane, m, (size, size).
+        position: of the camera, (3,), m.
+        axes: right, down, forward as columns, (3, 3).
+        focal_px: (1,).
+        shapes: number of each of the arm's geoms and 1 where it is a box, (k, 2).
+        sizes: of all geoms, (ngeom, 3), m.
+    """
+
+    pixels: np.ndarray
+    rays: np.ndarray
+    distance: np.ndarray
+    position: np.ndarray
+    axes: np.ndarray
+    focal_px: np.ndarray
+    shapes: np.ndarray
+    sizes: np.ndarray
+
+
+def camera_tables(camera: Camera, board: Whiteboard, model: mujoco.MjModel) -> CameraTables:
+    """Prepare to draw masks of a board before an arm.
+
+    Args:
+        camera: the camera.
+        board: gives the cells' places.
+        model: plant model; its geoms with contype 2 are the arm's.
+    """
+    z = board.config.centre[2]
+    axes = camera_axes(camera)
+    rays = _pixel_rays(camera, axes)
+    position = np.array(camera.position)
+    arm = [i for i in range(model.ngeom) if model.geom_contype[i] == ARM_CONTYPE]
+    return CameraTables(
+        pixels=_corner_pixels(board, plane_homography(camera, z), camera.size),
+        rays=rays,
+        distance=_distance_to_plane(rays, position, z),
+        position=position,
+        axes=axes,
+        focal_px=np.array([camera.focal_px]),
+        shapes=np.array([[i, int(model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX)] for i in arm], dtype=np.int64),
+        sizes=model.geom_size.copy(),
+    )
+
+
+def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:
+    """Number of the pixel that each corner of each cell falls in, −1 outside the image, (rows, columns, 4)."""
+    cell = board.config.cell
+    inset = 0.02  # of a cell: a corner belongs to its own cell
+    i, j = np.meshgrid(np.arange(board.cells.shape[0]), np.arange(board.cells.shape[1]), indexing="ij")
+    pixels = np.empty((*board.cells.shape, 4), dtype=np.int32)
+    for k, (di, dj) in enumerate(((inset, inset), (inset, 1 - inset), (1 - inset, inset), (1 - inset, 1 - inset))):
+        x = board.origin[0] + (i + di) * cell
+        y = board.origin[1] + (j + dj) * cell
+        u, v, w = (H[r, 0] * x + H[r, 1] * y + H[r, 2] for r in range(3))
+        column, row = np.floor(u / w).astype(int), np.floor(v / w).astype(int)
+        inside = (column >= 0) & (column < size) & (row >= 0) & (row < size) & (w > 0)
+        pixels[..., k] = np.where(inside, row * size + column, -1)
+    return pixels
+
+
+def _pixel_rays(camera: Camera, axes: np.ndarray) -> np.ndarray:
+    """Unit direction of sight through the middle of each pixel, world, (size, size, 3)."""
+    middle = (np.arange(camera.size) + 0.5 - camera.size / 2) / camera.focal_px
+    u, v = np.meshgrid(middle, middle)
+    rays = u[..., None] * axes[:, 0] + v[..., None] * axes[:, 1] + axes[:, 2]
+    return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+
+def _distance_to_plane(rays: np.ndarray, position: np.ndarray, z: float) -> np.ndarray:
+    """How far along each ray the board's plane lies, m; inf where it is not met, (size, size)."""
+    with np.errstate(divide="ignore"):
+        distance = (z - position[2]) / rays[..., 2]
+    return np.where(distance > 0, distance, np.inf)
+
+
+@njit(cache=True, nogil=True)
+def render_mask(camera, cells, plant, out):
+    """Draw a mask: ink and dark objects 0, everything else 255.
+
+    Args:
+        camera: `CameraTables`.
+        cells: the board's, uint8, (rows, columns).
+        plant: `plant_dtype` record, for where the arm's shapes are.
+        out: uint8, (size, size); overwritten.
+    """
+    out[:] = OTHER_PIXEL
+    flat = out.reshape(-1)
+    for i in range(cells.shape[0]):
+        for j in range(cells.shape[1]):
+            if cells[i, j] != 0:
+                for k in range(4):
+                    if camera.pixels[i, j, k] >= 0:
+                        flat[camera.pixels[i, j, k]] = INK_PIXEL
+    xpos, xmat = view2(plant.geom_xpos, plant.ngeom, 3), view2(plant.geom_xmat, plant.ngeom, 9)
+    for s in range(camera.shapes.shape[0]):
+        geom = camera.shapes[s, 0]
+        _hide_behind(camera, camera.shapes[s, 1], camera.sizes[geom], xpos[geom], xmat[geom], out)
+
+
+@njit(cache=True)
+def _hide_behind(camera, is_box, size, centre, mat, out):
+    """Unmark the marked pixels whose line of sight meets one shape before the board."""
+    eye, focal = camera.position, camera.focal_px[0]
+    if is_box:
+        bound = math.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2)
+    else:
+        bound = size[0] + size[1]
+    x = np.zeros(3)
+    for k in range(3):
+        for m in range(3):
+            x[k] += camera.axes[m, k] * (centre[m] - eye[m])
+    n = out.shape[0]
+    depth = x[2] - bound
+    if depth <= 1e-3:
+        u0, u1, v0, v1 = 0, n, 0, n
+    else:
+        reach = focal * bound / depth + 1.0
+        u, v = n / 2 + focal * x[0] / x[2], n / 2 + focal * x[1] / x[2]
+        # A sphere seen from the side looks longer: its half width is at most bound/(depth) times (1 + |offset|/depth).
+        stretch_u, stretch_v = 1.0 + abs(x[0]) / x[2], 1.0 + abs(x[1]) / x[2]
+        u0, u1 = max(0, int(u - reach * stretch_u)), min(n, int(u + reach * stretch_u) + 2)
+        v0, v1 = max(0, int(v - reach * stretch_v)), min(n, int(v + reach * stretch_v) + 2)
+    for row in range(v0, v1):
+        for column in range(u0, u1):
+            if out[row, column] == INK_PIXEL:
+                ray, length = camera.rays[row, column], camera.distance[row, column]
+                if is_box:
+                    hit = _ray_meets_box(eye, ray, length, centre, mat, size)
+                else:
+                    hit = _ray_meets_capsule(eye, ray, length, centre, mat, size)
+                if hit:
+                    out[row, column] = OTHER_PIXEL
+
+
+@njit(cache=True)
+def _ray_meets_capsule(eye, ray, length, centre, mat, size):
+    """Whether a line of sight passes within a capsule's radius of its axis: closest points of two segments."""
+    radius, half = size[0], size[1]
+    ax, ay, az = mat[2], mat[5], mat[8]
+    wx, wy, wz = eye[0] - centre[0], eye[1] - centre[1], eye[2] - centre[2]
+    b = ray[0] * ax + ray[1] * ay + ray[2] * az
+    d = ray[0] * wx + ray[1] * wy + ray[2] * wz
+    e = ax * wx + ay * wy + az * wz
+    denominator = 1.0 - b * b
+    s = (b * e - d) / denominator if denominator > 1e-9 else -d
+    s = min(max(s, 0.0), length)
+    t = min(max(b * s + e, -half), half)
+    s = min(max(b * t - d, 0.0), length)
+    px, py, pz = wx + s * ray[0] - t * ax, wy + s * ray[1] - t * ay, wz + s * ray[2] - t * az
+    return px * px + py * py + pz * pz < radius * radius
+
+
+@njit(cache=True)
+def _ray_meets_box(eye, ray, length, centre, mat, size):
+    """Whether a line of sight enters a box: the slab test in the box's axes."""
+    near, far = 0.0, length
+    for k in range(3):
+        origin = 0.0
+        direction = 0.0
+        for m in range(3):
+            origin += mat[3 * m + k] * (eye[m] - centre[m])
+            direction += mat[3 * m + k] * ray[m]
+        if abs(direction) < 1e-12:
+            if abs(origin) > size[k]:
+                return False
+            continue
+        a, b = (-size[k] - origin) / direction, (size[k] - origin) / direction
+        near, far = max(near, min(a, b)), min(far, max(a, b))
+    return near < far
+
+

@@ -1,0 +1,127 @@
+"""A simulated world as NumPy records: where its plant lies in memory, its sensors' errors, what a step measured."""
+
+import mujoco
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.arm import Arm
+from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig
+
+_f = np.float64
+_i = np.int64
+
+_VIEWED = ("ctrl", "qfrc_applied", "qfrc_constraint", "qpos", "qvel", "sensordata", "xpos", "xmat", "geom_xpos", "geom_xmat")
+_SENSORS = (
+    "wrist_force", "wrist_torque", "wrist_accelerometer", "pad_board", "pad_table", "arm_board", "arm_table",
+)  # fmt: skip
+
+
+def noise_channels(n: int) -> int:
+    """Count the random numbers one tick needs: q, q̇ and torque of n joints, force, moment, accelerometer."""
+    return 3 * n + 9
+
+
+def plant_dtype(n: int) -> np.dtype:
+    """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
+    return np.dtype(
+        [(name, np.uintp) for name in ("model", "data", *_VIEWED)]
+        + [(name, _i) for name in ("nv", "nbody", "ngeom", "nsensordata", "n_obstacles", "delay_ticks", "tick")]
+        + [(f"adr_{name}", _i) for name in _SENSORS]
+        + [
+            ("adr_obstacles", _i, (MAX_OBSTACLES,)),
+            ("obstacle_bodies", _i, (MAX_OBSTACLES,)),
+            ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
+            ("q_sigma", _f),
+            ("qd_sigma", _f),
+            ("torque_sigma", _f),
+            ("force_sigma", _f),
+            ("moment_sigma", _f),
+            ("accelerometer_sigma", _f),
+            ("wrench_bias", _f, (6,)),  # sensor axes, N and N m
+            ("tool_mass", _f),  # as the sensor's compensation believes, kg
+            ("tool_com", _f, (3,)),  # mount frame, m
+            ("tcp", _f, (3,)),  # mount frame, m
+            ("tau_delayed", _f, (n,)),  # command waiting for its turn, N m
+            ("push_body", _i),  # body that is pushed; 0 for none
+            ("push_point", _f, (3,)),  # in that body's frame, m
+            ("push_force", _f, (3,)),  # world axes, N
+            ("push_start", _i),  # tick
+            ("push_stop", _i),  # tick
+            ("push_ramp", _i),  # ticks from nothing to full
+            ("origin", _f, (2,)),  # world corner of the board's first cell, m
+            ("cell", _f),  # m
+            ("pad_half", _f, (2,)),  # m; 0 without a pad
+            ("press_n", _f),
+        ]
+    )
+
+
+report_dtype = np.dtype(
+    [
+        ("tool_force_mean", _f),  # of the ticks, |pad force| by the simulator, N
+        ("tool_force_peak", _f),  # N
+        ("contact_ticks", _i),  # ticks with the pad on the board
+        ("obstacle_force_peak", _f),  # N
+        ("arm_touched", _i),  # 1 where any part but the pad met board or table
+        ("erased", _i),  # ink cells erased
+        ("ticks", _i),
+    ]
+)
+"""What one policy step measured in the simulator: for rewards, metrics and tests, never for a controller."""
+
+
+def trace_dtype(n: int) -> np.dtype:
+    """Describe one tick as recorded for experiments."""
+    return np.dtype(
+        [
+            ("time", _f),  # s
+            ("q", _f, (n,)),  # plant, rad
+            ("torque", _f, (n,)),  # command, N m
+            ("position", _f, (3,)),  # tool, m
+            ("error", _f, (6,)),  # x_d − x, m and rad
+            ("tool_force", _f, (3,)),  # board on pad by the simulator, world axes, N
+            ("wrench_ee", _f, (6,)),  # as measured
+            ("obstacle_force", _f),  # largest |force| of one obstacle on the arm by the simulator, N
+            ("obstacle_position", _f, (MAX_OBSTACLES, 3)),  # m
+            ("tau_arm", _f, (n,)),  # true external torque less the pad's, N m
+            ("residual", _f, (n,)),  # N m
+            ("residual_trigger", _f, (n,)),  # N m
+            ("mode", _i),
+            ("holding", _i),
+            ("link", _i),
+            ("ink_left", _f),  # share; filled once a policy step
+        ]
+    )
+
+
+def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, config: WorldConfig) -> None:
+    """Fill a `plant_dtype` record; the caller keeps model and data alive."""
+    plant["model"], plant["data"] = model._address, data._address
+    for name in _VIEWED:
+        plant[name] = getattr(data, name).ctypes.data
+    for name in ("nv", "nbody", "ngeom", "nsensordata"):
+        plant[name] = getattr(model, name)
+    plant["delay_ticks"] = config.plant.torque_delay_ticks
+    names = {model.sensor(i).name: model.sensor_adr[i] for i in range(model.nsensor)}
+    for name in _SENSORS:
+        plant[f"adr_{name}"] = names.get(name, -1)
+    plant["n_obstacles"] = len(config.obstacles)
+    for index in range(len(config.obstacles)):
+        plant["adr_obstacles"][index] = names[f"arm_obstacle{index}"]
+        plant["obstacle_bodies"][index] = model.body(f"obstacle{index}").id
+    plant["friction"] = arm.friction
+    plant["friction"][:, 0] *= config.plant.friction_scale
+    sensors = config.sensors
+    for field, value in (
+        ("q_sigma", sensors.q_rad), ("qd_sigma", sensors.qd_rad_s), ("torque_sigma", sensors.torque_nm),
+        ("force_sigma", sensors.force_n), ("moment_sigma", sensors.moment_nm),
+        ("accelerometer_sigma", sensors.accelerometer_m_s2),
+    ):  # fmt: skip
+        plant[field] = value
+    if arm.tool is None:
+        raise InvalidInputError(f"arm '{arm.name}' has no tool; a simulated world needs one, such as robots.WIPING_PAD")
+    plant["tool_mass"], plant["tool_com"] = arm.tool.inertia.mass, arm.tool.inertia.com
+    plant["tcp"] = arm.tool.tcp
+    if arm.tool.pad_half_size is not None:
+        plant["pad_half"] = arm.tool.pad_half_size[:2]
+    plant["cell"], plant["press_n"] = config.board.cell, config.board.press_n

@@ -1,0 +1,150 @@
+"""MJCF of the world: the arm's body tree, table and board, obstacles on springs, and the sensors that watch them."""
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import mujoco
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.facts import ArmFacts, Inertia, Tool
+from contactsafe.robot.mjcf import FLANGE_SITE, arm_body, model_root, numbers
+from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, WorldConfig
+
+_STIFF = "0.004 1"  # contact time constant, s, and damping ratio: four ticks, for hard plastic on metal
+_FOAM_SOLREF, _FOAM_SOLIMP = "0.15 0.4", "0.5 0.5 0.001"  # the pad: measured 5 to 7 kN/m under the arm's inertia
+
+
+def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
+    """Compile the world around an arm that was built from facts.
+
+    Raises:
+        InvalidInputError: the arm has no facts to build a plant from.
+    """
+    return mujoco.MjModel.from_xml_string(scene_mjcf(arm, config))
+
+
+def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
+    """Write the MJCF of the world around an arm."""
+    if arm.facts is None or arm.tool is None:
+        raise InvalidInputError(f"arm '{arm.name}' has no facts to build a plant from; give contactsafe.robots.panda()")
+    root = model_root("contactsafe world")
+    _visual(root)
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", pos="0.6 -0.6 2", dir="0 0.3 -1", diffuse="0.7 0.7 0.7")
+    _board(world, config.board)
+    world.append(arm_body(_perturbed(arm.facts, config.plant), _loaded(arm.tool, config.plant)))
+    _camera(world, config)
+    for index, obstacle in enumerate(config.obstacles):
+        _obstacle(world, index, obstacle)
+    tool_body = next(body for body in world.iter("body") if body.get("name") == "tool")
+    ET.SubElement(tool_body, "site", name="tool_com", pos=numbers(arm.tool.inertia.com))
+    if arm.tool.pad_half_size is not None:
+        pad = next(geom for geom in tool_body.iter("geom") if geom.get("name") == "pad")
+        pad.set("solref", _FOAM_SOLREF)
+        pad.set("solimp", _FOAM_SOLIMP)
+        pad.set("priority", "1")
+        pad.set("friction", numbers((config.board.friction, 0.005, 0.0001)))
+    actuator = ET.SubElement(root, "actuator")
+    for index in range(1, arm.n + 1):
+        ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}")
+    _sensors(root, arm, len(config.obstacles))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _perturbed(facts: ArmFacts, plant: PlantConfig) -> ArmFacts:
+    if plant.inertia_scale == 1.0:
+        return facts
+    k = plant.inertia_scale
+    links = tuple(
+        replace(
+            link,
+            inertia=replace(
+                link.inertia,
+                mass=k * link.inertia.mass,
+                tensor=tuple(k * value for value in link.inertia.tensor),  # type: ignore[arg-type]
+            ),
+        )
+        for link in facts.links
+    )
+    return replace(facts, links=links)
+
+
+def _loaded(tool: Tool, plant: PlantConfig) -> Tool:
+    if plant.payload_kg == 0.0:
+        return tool
+    point = Inertia(plant.payload_kg, tool.inertia.com, (1e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0))
+    return replace(tool, inertia=tool.inertia + point)
+
+
+def _visual(root: ET.Element) -> None:
+    visual = ET.SubElement(root, "visual")
+    ET.SubElement(visual, "global", offwidth="1280", offheight="1280")
+    ET.SubElement(visual, "quality", offsamples="0", shadowsize="0")
+    ET.SubElement(visual, "map", znear="0.01")
+
+
+def _board(world: ET.Element, board: BoardConfig) -> None:
+    x, y, z = board.centre
+    thickness = 0.005
+    ET.SubElement(
+        world, "geom", name="table", type="box", pos=numbers((x, 0.0, z - 0.035)), size=numbers((0.6, 0.9, 0.025)),
+        contype="1", conaffinity="2", solref=_STIFF, rgba="0.72 0.66 0.58 1",
+    )  # fmt: skip
+    ET.SubElement(
+        world, "geom", name="board", type="box", pos=numbers((x, y, z - thickness)),
+        size=numbers((board.size[0] / 2, board.size[1] / 2, thickness)),
+        contype="1", conaffinity="2", solref=_STIFF, rgba="0.97 0.97 0.97 1",
+    )  # fmt: skip
+
+
+def _camera(world: ET.Element, config: WorldConfig) -> None:
+    camera = config.camera
+    fovy = math.degrees(2 * math.atan(camera.size / 2 / camera.focal_px))
+    target = ET.SubElement(world, "body", name="camera_target", pos=numbers(camera.target))
+    ET.SubElement(target, "site", name="camera_target")
+    ET.SubElement(
+        world, "camera", name="board_camera", mode="targetbody", target="camera_target",
+        pos=numbers(camera.position), fovy=numbers([fovy]),
+    )  # fmt: skip
+
+
+def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
+    name = f"obstacle{index}"
+    body = ET.SubElement(world, "body", name=name, pos=numbers(obstacle.position), gravcomp="1")
+    damping = 2 * obstacle.damping_ratio * math.sqrt(obstacle.stiffness * obstacle.mass)
+    for axis, direction in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True):
+        ET.SubElement(
+            body, "joint", name=f"{name}_{axis}", type="slide", axis=direction,
+            stiffness=numbers([obstacle.stiffness]), damping=numbers([damping]),
+        )  # fmt: skip
+    shape = {"type": "sphere", "size": numbers([obstacle.radius])}
+    if obstacle.half_length > 0:
+        shape = {"type": "cylinder", "size": numbers((obstacle.radius, obstacle.half_length))}
+    ET.SubElement(
+        body, "geom", name=name, mass=numbers([obstacle.mass]), contype="1", conaffinity="2", solref=_STIFF,
+        rgba="0.85 0.45 0.1 1", **shape,
+    )  # fmt: skip
+
+
+def _sensors(root: ET.Element, arm: Arm, obstacles: int) -> None:
+    sensor = ET.SubElement(root, "sensor")
+    ET.SubElement(sensor, "force", name="wrist_force", site=FLANGE_SITE)
+    ET.SubElement(sensor, "torque", name="wrist_torque", site=FLANGE_SITE)
+    ET.SubElement(sensor, "accelerometer", name="wrist_accelerometer", site="tool_com")
+    if arm.tool is not None and arm.tool.pad_half_size is not None:
+        ET.SubElement(
+            sensor, "contact", name="pad_board", geom1="board", geom2="pad", reduce="netforce", data="found force torque pos"
+        )
+        ET.SubElement(sensor, "contact", name="pad_table", geom1="table", geom2="pad", reduce="netforce", data="found force")
+    for geom in ("board", "table"):
+        ET.SubElement(
+            sensor, "contact", name=f"arm_{geom}", geom1=geom, subtree2="link1", reduce="netforce", data="found force"
+        )
+    for index in range(obstacles):
+        ET.SubElement(
+            sensor, "contact", name=f"arm_obstacle{index}", geom1=f"obstacle{index}", subtree2="link1",
+            reduce="netforce", data="found force",
+        )  # fmt: skip

@@ -1,0 +1,196 @@
+"""The simulated millisecond, compiled: sense, control, act, integrate, measure. Runs without the GIL."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from contactsafe.control.tick import control_tick
+from contactsafe.robot.friction import joint_friction
+from contactsafe.robot.linalg import cross, matvec, matvec_t
+from contactsafe.robot.native import mj_jac, mj_step, view1, view2
+from contactsafe.sim.whiteboard import erase_under_pad
+
+_ERASE_EVERY = 8  # ticks: at 0.4 m/s the pad moves 3 mm between, a twentieth of its width
+
+
+@njit(cache=True, nogil=True)
+def run_ticks(plant, controller, cells, noise, ticks, report, trace):
+    """Run a number of control ticks of one world.
+
+    Args:
+        plant: `plant_dtype` record.
+        controller: `controller_dtype` record, its target set.
+        cells: the board's, uint8, (rows, columns).
+        noise: standard normal numbers, (at least ticks, `noise_channels`).
+        ticks: how many.
+        report: `report_dtype` record; overwritten.
+        trace: array of `trace_dtype` records, one a tick, or an empty one.
+    """
+    report.tool_force_mean, report.tool_force_peak, report.contact_ticks = 0.0, 0.0, 0
+    report.obstacle_force_peak, report.arm_touched, report.erased = 0.0, 0, 0
+    report.ticks = ticks
+    for k in range(ticks):
+        sense(plant, controller, noise[k])
+        control_tick(controller)
+        act(plant, controller, noise[k])
+        mj_step(plant.model, plant.data)
+        _measure(plant, controller, cells, report)
+        if trace.shape[0] > 0:
+            _record(plant, controller, trace[k])
+        plant.tick += 1
+    report.tool_force_mean /= ticks
+
+
+@njit(cache=True)
+def sense(plant, controller, noise):
+    """Fill the controller's measurement from the plant, with noise; the only way from plant to controller."""
+    measurement = controller.measurement
+    n = measurement.q.shape[0]
+    qpos, qvel = view1(plant.qpos, n), view1(plant.qvel, n)
+    for i in range(n):
+        measurement.q[i] = qpos[i] + plant.q_sigma * noise[i]
+        measurement.qd[i] = qvel[i] + plant.qd_sigma * noise[n + i]
+    _sense_wrench(plant, controller, noise[3 * n :])
+
+
+@njit(cache=True)
+def _sense_wrench(plant, controller, noise):
+    """Wrist sensor with its inertial unit: what is left after the tool's weight and inertia are taken out.
+
+    A sensor reads what the arm exerts on the tool. With the specific force a of the tool's centre of mass,
+    f_env = m a − f_read and t_env = com × m a − t_read about the flange; then moved to the tool point. The axes are
+    those of the last tick's measured posture.
+    """
+    data = view1(plant.sensordata, plant.nsensordata)
+    ma, force, moment = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(3):
+        accelerometer = data[plant.adr_wrist_accelerometer + k] + plant.accelerometer_sigma * noise[6 + k]
+        ma[k] = plant.tool_mass * accelerometer
+        force[k] = ma[k] - data[plant.adr_wrist_force + k] + plant.wrench_bias[k] + plant.force_sigma * noise[k]
+    weight_moment = cross(plant.tool_com, ma)
+    for k in range(3):
+        read = data[plant.adr_wrist_torque + k]
+        moment[k] = weight_moment[k] - read + plant.wrench_bias[3 + k] + plant.moment_sigma * noise[3 + k]
+    moment -= cross(plant.tcp, force)
+    R = controller.dynamics.rotation
+    measurement = controller.measurement
+    measurement.wrench_ee[:3] = matvec(R, force)
+    measurement.wrench_ee[3:] = matvec(R, moment)
+    measurement.has_wrench = 1
+
+
+@njit(cache=True)
+def act(plant, controller, noise):
+    """Apply the command to the plant: delay, torque noise, friction, and the push that disturbs it."""
+    tau = controller.output.torque
+    n = tau.shape[0]
+    ctrl, applied = view1(plant.ctrl, n), view1(plant.qfrc_applied, n)
+    friction = joint_friction(plant.friction, view1(plant.qvel, n))
+    push = push_torque(plant, n)
+    for i in range(n):
+        command = plant.tau_delayed[i] if plant.delay_ticks > 0 else tau[i]
+        plant.tau_delayed[i] = tau[i]
+        ctrl[i] = command + plant.torque_sigma * noise[2 * n + i]
+        applied[i] = push[i] - friction[i]
+
+
+@njit(cache=True)
+def push_torque(plant, n):
+    """Give the joint torque of the push in force at this tick, (n,), N m."""
+    tau = np.zeros(n)
+    if plant.push_body == 0 or plant.tick < plant.push_start or plant.tick >= plant.push_stop:
+        return tau
+    body = plant.push_body
+    R = view2(plant.xmat, plant.nbody, 9)[body].reshape(3, 3)
+    point = view2(plant.xpos, plant.nbody, 3)[body] + matvec(R, plant.push_point)
+    J = np.zeros((3, plant.nv))
+    unused = np.zeros((3, plant.nv))
+    mj_jac(plant.model, plant.data, J.ctypes, unused.ctypes, point.ctypes, body)
+    share = min(1.0, (plant.tick - plant.push_start + 1) / max(plant.push_ramp, 1))
+    for i in range(n):
+        for k in range(3):
+            tau[i] += J[k, i] * plant.push_force[k] * share
+    return tau
+
+
+@njit(cache=True)
+def pad_force(plant, out):
+    """Fill the force of board and table on the pad by the simulator, world axes, (3,), N."""
+    data = view1(plant.sensordata, plant.nsensordata)
+    for k in range(3):
+        out[k] = 0.0
+    if plant.adr_pad_board >= 0:
+        for k in range(3):
+            out[k] = data[plant.adr_pad_board + 1 + k] + data[plant.adr_pad_table + 1 + k]
+
+
+@njit(cache=True)
+def obstacle_force(plant):
+    """Give the largest |force| between the arm and one obstacle by the simulator, N."""
+    data = view1(plant.sensordata, plant.nsensordata)
+    largest = 0.0
+    for index in range(plant.n_obstacles):
+        adr = plant.adr_obstacles[index]
+        largest = max(largest, math.sqrt(data[adr + 1] ** 2 + data[adr + 2] ** 2 + data[adr + 3] ** 2))
+    return largest
+
+
+@njit(cache=True)
+def _measure(plant, controller, cells, report):
+    force = np.empty(3)
+    pad_force(plant, force)
+    size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
+    report.tool_force_mean += size
+    report.tool_force_peak = max(report.tool_force_peak, size)
+    report.obstacle_force_peak = max(report.obstacle_force_peak, obstacle_force(plant))
+    data = view1(plant.sensordata, plant.nsensordata)
+    pad_contacts = 0.0
+    if plant.adr_pad_board >= 0:
+        pad_contacts = data[plant.adr_pad_board] + data[plant.adr_pad_table]
+    if data[plant.adr_arm_board] + data[plant.adr_arm_table] > pad_contacts:
+        report.arm_touched = 1
+    if pad_contacts > 0.0:
+        report.contact_ticks += 1
+    if plant.tick % _ERASE_EVERY == 0 and size > plant.press_n:
+        report.erased += erase_under_pad(
+            cells, plant.origin[0], plant.origin[1], plant.cell, controller.output.position, controller.output.rotation,
+            plant.pad_half[0], plant.pad_half[1],
+        )  # fmt: skip
+
+
+@njit(cache=True)
+def _record(plant, controller, row):
+    out = controller.output
+    n = out.torque.shape[0]
+    row.time = plant.tick * controller.params.dt
+    row.q[:] = view1(plant.qpos, n)
+    row.torque[:] = out.torque
+    row.position[:] = out.position
+    row.error[:] = out.error
+    row.wrench_ee[:] = controller.measurement.wrench_ee
+    row.residual[:] = out.residual
+    row.residual_trigger[:] = out.residual_trigger
+    row.mode, row.holding, row.link = out.mode, out.holding, out.link
+    pad_force(plant, row.tool_force)
+    row.obstacle_force = obstacle_force(plant)
+    xpos = view2(plant.xpos, plant.nbody, 3)
+    for index in range(plant.n_obstacles):
+        row.obstacle_position[index, :] = xpos[plant.obstacle_bodies[index]]
+    row.tau_arm[:] = view1(plant.qfrc_constraint, n)
+    row.tau_arm[:] += push_torque(plant, n)
+    row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, out.position))
+
+
+@njit(cache=True)
+def _pad_wrench(plant, position):
+    """Wrench of the board on the pad about the tool point by the simulator, (6,)."""
+    wrench = np.zeros(6)
+    if plant.adr_pad_board < 0:
+        return wrench
+    data = view1(plant.sensordata, plant.nsensordata)
+    adr = plant.adr_pad_board
+    force, torque, place = data[adr + 1 : adr + 4], data[adr + 4 : adr + 7], data[adr + 7 : adr + 10]
+    wrench[:3] = force
+    wrench[3:] = torque + cross(place - position, force)
+    return wrench

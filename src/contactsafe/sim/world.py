@@ -1,0 +1,168 @@
+"""Simulated worlds: an arm under its controller before a whiteboard, one or many, stepped natively."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from contactsafe.control.config import ControllerConfig
+from contactsafe.control.controller import Controller
+from contactsafe.control.records import controller_dtype
+from contactsafe.robot.arm import Arm
+from contactsafe.sim.camera import camera_tables, plane_homography, render_mask
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.records import fill_plant, noise_channels, plant_dtype, report_dtype, trace_dtype
+from contactsafe.sim.scene import build_plant
+from contactsafe.sim.stepping import run_ticks
+from contactsafe.sim.whiteboard import INK, Whiteboard
+
+POLICY_RATE_HZ = 60
+"""Rate of the policy; 1 kHz does not divide by it, so its steps last 17, 17 and 16 ticks in turn."""
+
+MAX_TICKS = 17
+
+
+def ticks_of_step(step: int) -> int:
+    """Give the number of 1 kHz ticks of the policy step with this number, 17, 17, 16 in turn."""
+    return 16 if step % 3 == 2 else 17
+
+
+@njit(cache=True, nogil=True)
+def run_worlds(start, stop, plants, controllers, cells, noise, ticks, reports, traces):
+    """Run ticks[i] ticks of each world from start to stop; see `run_ticks`."""
+    for i in range(start, stop):
+        run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
+
+
+class Worlds:
+    """N independent worlds with one configuration, stepped in native threads.
+
+    Args:
+        arm: built from facts, with a tool.
+        world: plant, sensors, board, camera, obstacles.
+        controller: a preset or another configuration, the same for all.
+        n: how many.
+        seed: of the sensors' noise and bias; world i draws from its own stream.
+
+    Attributes:
+        plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `report_dtype` records, (n,).
+        cells: the boards, uint8, (n, rows, columns).
+        boards: `Whiteboard` objects whose cells lie in `cells`.
+        masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
+        camera: `CameraTables`.
+        homography: of board plane to mask pixels, (3, 3).
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        world: WorldConfig | None = None,
+        controller: ControllerConfig | None = None,
+        n: int = 1,
+        seed: int | None = None,
+    ):
+        self.arm, self.config, self.n = arm, world or WorldConfig(), n
+        self.model = build_plant(arm, self.config)
+        self.datas = [mujoco.MjData(self.model) for _ in range(n)]
+        self.boards = [Whiteboard(self.config.board) for _ in range(n)]
+        self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
+        self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
+        self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
+        self.reports = np.zeros(n, dtype=report_dtype)
+        self._owners = [Controller(arm, controller, record) for record in self.controllers]
+        for i in range(n):
+            self.boards[i].cells = self.cells[i]
+            fill_plant(self.plants[i], self.model, self.datas[i], arm, self.config)
+            self.plants[i]["origin"] = self.boards[i].origin
+        size = self.config.camera.size
+        self.masks = np.full((n, size, size), 255, dtype=np.uint8)
+        self.camera = camera_tables(self.config.camera, self.boards[0], self.model)
+        self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
+        self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
+        self._no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
+        self._threads = ThreadPoolExecutor(min(n, os.cpu_count() or 1)) if n > 1 else None
+        self.seed(seed)
+
+    def seed(self, seed: int | None) -> None:
+        """Start the worlds' noise anew."""
+        streams = np.random.SeedSequence(seed).spawn(self.n)
+        self.rngs = [np.random.Generator(np.random.SFC64(stream)) for stream in streams]
+
+    def reset(self, i: int, q) -> None:
+        """Put world i's arm at rest at q (n,) rad, with a new sensor bias; the board stays as it is."""
+        q = self.arm.joint_vector(q, "q")
+        model, data, plant = self.model, self.datas[i], self.plants[i]
+        mujoco.mj_resetData(model, data)
+        data.qpos[: self.arm.n] = q
+        self._owners[i].reset(q)
+        dynamics = self.arm.dynamics(q, np.zeros(self.arm.n))
+        self.controllers[i]["dynamics"] = dynamics
+        data.ctrl[:] = dynamics["g"]
+        mujoco.mj_forward(model, data)
+        plant["tick"], plant["push_body"] = 0, 0
+        plant["tau_delayed"] = dynamics["g"]
+        sensors = self.config.sensors
+        plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
+        plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
+
+    def draw_noise(self) -> np.ndarray:
+        """Draw the sensors' noise for one step of every world, (n, MAX_TICKS, channels)."""
+        for rng, noise in zip(self.rngs, self._noise, strict=True):
+            rng.standard_normal(out=noise)
+        return self._noise
+
+    def in_threads(self, run) -> None:
+        """Call run(start, stop) over all worlds, one share a thread; errors surface here."""
+        if self._threads is None:
+            run(0, self.n)
+            return
+        workers = self._threads._max_workers
+        bounds = np.linspace(0, self.n, workers + 1).astype(int)
+        for future in [self._threads.submit(run, bounds[k], bounds[k + 1]) for k in range(workers)]:
+            future.result()
+
+    def run(self, ticks, trace: np.ndarray | None = None) -> None:
+        """Run control ticks in every world.
+
+        Args:
+            ticks: at most MAX_TICKS; a number or one for each world.
+            trace: `trace_dtype` records to fill, (n, ticks); None to record nothing.
+        """
+        ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
+        noise = self.draw_noise()
+        traces = self._no_trace if trace is None else trace
+        self.in_threads(
+            lambda start, stop: run_worlds(
+                start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces
+            )
+        )
+
+    def render(self) -> np.ndarray:
+        """Draw every camera's mask, uint8, (n, size, size)."""
+        for i in range(self.n):
+            render_mask(self.camera, self.cells[i], self.plants[i], self.masks[i])
+        return self.masks
+
+    def ink_cells(self) -> np.ndarray:
+        """Count the cells that hold ink, (n,)."""
+        return np.count_nonzero(self.cells == INK, axis=(1, 2))
+
+    def push(self, i: int, body: str, point, force, start_s: float, stop_s: float, ramp_s: float = 0.02) -> None:
+        """Push a link of world i.
+
+        Args:
+            i: which world.
+            body: 'link1' … 'link7' or 'tool'.
+            point: in the body's frame, (3,), m.
+            force: world axes, (3,), N.
+            start_s, stop_s: since reset, s.
+            ramp_s: time from nothing to full force, s.
+        """
+        plant = self.plants[i]
+        plant["push_body"] = self.model.body(body).id
+        plant["push_point"], plant["push_force"] = point, force
+        dt = self.model.opt.timestep
+        plant["push_start"], plant["push_stop"] = round(start_s / dt), round(stop_s / dt)
+        plant["push_ramp"] = max(1, round(ramp_s / dt))
