@@ -1,5 +1,6 @@
 """Sphinx settings. Build: make docs."""
 
+import inspect
 import os
 import re
 
@@ -42,7 +43,6 @@ apidoc_modules = [
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_mock_imports = []
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
@@ -54,11 +54,20 @@ def _plain_text(app, what, name, obj, options, lines):
         parts = re.split(r"(`[^`]*`)", line)
         parts[::2] = [re.sub(r"([|*])|(?<=\w)(_)(?!\w)", r"\\\g<0>", part) for part in parts[::2]]
         lines[index] = "".join(parts)
+    if what in ("data", "attribute"):
+        lines.insert(0, "")  # or napoleon would read "Edges: of the classes" as a type and its description
 
 
 def _skip(app, what, name, obj, skip, options):
-    """Leave out what a NamedTuple makes of its fields: they stand under Attributes."""
-    return True if type(obj).__name__ == "_tuplegetter" else None
+    """Leave out what is documented elsewhere.
+
+    Fields of a NamedTuple stand under Attributes; what a package passes on from its modules stands with the module.
+    """
+    if type(obj).__name__ == "_tuplegetter":
+        return True
+    page = app.env.docname.removeprefix("api/")
+    passed_on = what == "module" and (inspect.isclass(obj) or inspect.isfunction(obj)) and obj.__module__ != page
+    return True if passed_on else None
 
 
 def setup(app):
