@@ -3,9 +3,12 @@
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
+from contactsafe.envs import register as _register
 from contactsafe.errors import ContactSafeError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
+
+_register()
 
 __version__ = "0.1.0"
 

@@ -53,6 +53,7 @@ class Worlds:
         masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
         camera: `CameraTables`.
         homography: of board plane to mask pixels, (3, 3).
+        no_trace: an empty trace, for `run_worlds` and its like.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Worlds:
         self.camera = camera_tables(self.config.camera, self.boards[0], self.model)
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
-        self._no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
+        self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
         self._threads = ThreadPoolExecutor(min(n, os.cpu_count() or 1)) if n > 1 else None
         self.seed(seed)
 
@@ -106,6 +107,11 @@ class Worlds:
         sensors = self.config.sensors
         plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
+
+    def close(self) -> None:
+        """Stop the threads."""
+        if self._threads is not None:
+            self._threads.shutdown()
 
     def draw_noise(self) -> np.ndarray:
         """Draw the sensors' noise for one step of every world, (n, MAX_TICKS, channels)."""
@@ -132,7 +138,7 @@ class Worlds:
         """
         ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
         noise = self.draw_noise()
-        traces = self._no_trace if trace is None else trace
+        traces = self.no_trace if trace is None else trace
         self.in_threads(
             lambda start, stop: run_worlds(
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces

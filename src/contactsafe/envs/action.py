@@ -1,0 +1,108 @@
+"""From an action to the controller's target, compiled: increments of x_d, K1 and D1, then the posture by IK."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from contactsafe.envs.config import ActionConfig
+from contactsafe.robot.ik import solve_ik
+from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
+from contactsafe.sim.config import BoardConfig
+
+DOWN = np.array([0.0, 1.0, 0.0, 0.0])
+"""Orientation of a tool that points straight down, w x y z."""
+
+_UNDO_DOWN = np.array([0.0, -1.0, 0.0, 0.0])
+
+ACTION_NAMES = tuple(
+    [f"x_d {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    + [f"K1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    + [f"D1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+)
+
+
+class ActionLimits(NamedTuple):
+    """An `ActionConfig` as arrays for compiled code.
+
+    Attributes:
+        step: largest change of pose, K1, D1, (18,).
+        low, high: bounds of x_d along x, y, z, m, and of the rotation vector from straight down, rad, (6,).
+        K_low, K_high, D_low, D_high: (6,).
+        lead: (1,), m.
+    """
+
+    step: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    K_low: np.ndarray
+    K_high: np.ndarray
+    D_low: np.ndarray
+    D_high: np.ndarray
+    lead: np.ndarray
+
+
+def action_limits(config: ActionConfig, board: BoardConfig) -> ActionLimits:
+    """Resolve an action configuration for a board."""
+    x, y, z = board.centre
+    reach, tilt = config.reach, config.tilt
+    return ActionLimits(
+        step=np.array([*config.translation, *config.rotation, *config.stiffness, *config.damping]),
+        low=np.array([x - reach, y - reach, z - config.press, -tilt, -tilt, -tilt]),
+        high=np.array([x + reach, y + reach, z + config.height, tilt, tilt, tilt]),
+        K_low=np.array(config.stiffness_low),
+        K_high=np.array(config.stiffness_high),
+        D_low=np.array(config.damping_low),
+        D_high=np.array(config.damping_high),
+        lead=np.array([config.lead]),
+    )
+
+
+@njit(cache=True)
+def rotation_from_down(quat):
+    """Give the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
+    return quat_to_rotvec(quat_multiply(quat, _UNDO_DOWN))
+
+
+@njit(cache=True, nogil=True)
+def apply_action(c, limits, q_min, q_max, action):
+    """Move the target of a `controller_dtype` record by one action.
+
+    x_d never leads the tool by more than `lead` along the board, nor leaves its bounds; the posture follows by
+    warm-started inverse kinematics of x_d, and stays where it was when none is found.
+
+    Args:
+        c: the controller; its `output.position` is where the tool was measured last.
+        limits: `ActionLimits`.
+        q_min, q_max: joint range, (n,), rad.
+        action: (18,); clipped to [−1, 1].
+    """
+    target = c.target
+    rotvec = rotation_from_down(target.quat)
+    for i in range(6):
+        a = min(max(action[i], -1.0), 1.0) * limits.step[i]
+        if i < 3:
+            target.position[i] = min(max(target.position[i] + a, limits.low[i]), limits.high[i])
+        else:
+            rotvec[i - 3] = min(max(rotvec[i - 3] + a, limits.low[i]), limits.high[i])
+        K = target.K_task[i] + min(max(action[6 + i], -1.0), 1.0) * limits.step[6 + i]
+        D = target.D_task[i] + min(max(action[12 + i], -1.0), 1.0) * limits.step[12 + i]
+        target.K_task[i] = min(max(K, limits.K_low[i]), limits.K_high[i])
+        target.D_task[i] = min(max(D, limits.D_low[i]), limits.D_high[i])
+    for i in range(2):
+        tool = c.output.position[i]
+        target.position[i] = min(max(target.position[i], tool - limits.lead[0]), tool + limits.lead[0])
+    target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
+    q_pose = np.empty(target.q_pose.shape[0])
+    error, rotation_error = solve_ik(c.handle, target.position, target.quat, target.q_pose, q_min, q_max, q_pose)
+    if error < 1e-3 and rotation_error < 1e-2:
+        target.q_pose[:] = q_pose
+
+
+@njit(cache=True)
+def observed_pose(c, out):
+    """Fill tool position, m, and rotation vector from straight down, rad, as measured, (6,)."""
+    rotvec = rotation_from_down(matrix_to_quat(c.output.rotation))
+    for i in range(3):
+        out[i] = c.output.position[i]
+        out[3 + i] = rotvec[i]

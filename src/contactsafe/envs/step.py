@@ -1,0 +1,108 @@
+"""One policy step of many wiping tasks, compiled: action, ticks, mask, reward. Runs without the GIL."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from contactsafe.envs.action import apply_action, observed_pose
+from contactsafe.sim.camera import render_mask
+from contactsafe.sim.stepping import run_ticks
+from contactsafe.sim.whiteboard import INK
+
+REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
+
+_f = np.float64
+_i = np.int64
+
+task_dtype = np.dtype(
+    [
+        ("steps", _i),  # policy steps since reset
+        ("ink_start", _i),  # cells at reset
+        ("ink", _i),  # cells now
+        ("distance", _f),  # from tool to nearest ink, m; 0 where there is none
+        ("pose", _f, (6,)),  # observation
+        ("reward", _f, (len(REWARD_TERMS),)),
+        ("clean", _i),
+        ("arm_touched", _i),
+        ("force_mean", _f),  # of the step, N
+        ("force_peak", _f),  # of the step, N
+    ]
+)
+"""What the task knows of one world."""
+
+rewards_dtype = np.dtype(
+    [(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_share")]
+)
+
+
+@njit(cache=True)
+def nearest_ink(cells, origin, cell, position):
+    """Count the ink and find how far the nearest of it lies from a point along the board.
+
+    Args:
+        cells: uint8, (rows, columns).
+        origin: world corner of cell (0, 0), (2,), m.
+        cell: edge, m.
+        position: (≥ 2,), m.
+
+    Returns:
+        Number of ink cells; distance, m, 0 where there is none.
+    """
+    count = 0
+    best = math.inf
+    px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
+    for i in range(cells.shape[0]):
+        for j in range(cells.shape[1]):
+            if cells[i, j] == INK:
+                count += 1
+                d = (i - px) * (i - px) + (j - py) * (j - py)
+                best = min(best, d)
+    if count == 0:
+        return 0, 0.0
+    return count, math.sqrt(best) * cell
+
+
+@njit(cache=True)
+def score(task, report, rewards, ink, distance):
+    """Fill the reward's terms of one step, and the step's ends.
+
+    Finishing must pay best: `ink` and `done` are paid once for what is gone; `approach` is a difference, so it
+    cannot be earned in circles; `contact` is less than `time` takes.
+    """
+    wiped = task.ink - ink
+    task.clean = 1 if ink <= rewards.clean_share * task.ink_start else 0
+    task.arm_touched = report.arm_touched
+    task.force_mean, task.force_peak = report.tool_force_mean, report.tool_force_peak
+    touching = report.contact_ticks > 0 and report.tool_force_peak < rewards.force_limit_n
+    excess = min(max(report.tool_force_peak / rewards.gentle_n - 1.0, 0.0), 4.0)
+    task.reward[0] = rewards.ink * wiped / max(task.ink_start, 1)
+    task.reward[1] = rewards.done * task.clean
+    task.reward[2] = rewards.approach * (task.distance - distance) if wiped == 0 else 0.0
+    task.reward[3] = rewards.contact if touching else 0.0
+    task.reward[4] = rewards.time
+    task.reward[5] = rewards.force * excess
+    task.reward[6] = rewards.arm_table * report.arm_touched
+    task.ink, task.distance = ink, distance
+
+
+@njit(cache=True, nogil=True)
+def step_tasks(
+    start, stop, plants, controllers, cells, noise, ticks, reports, traces, camera, limits, q_min, q_max, actions,
+    rewards, tasks, masks,
+):  # fmt: skip
+    """Run one policy step of each task from start to stop; the arrays are those of `Worlds` and `WipingTasks`."""
+    for i in range(start, stop):
+        apply_action(controllers[i], limits, q_min, q_max, actions[i])
+        run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
+        ink, distance = nearest_ink(cells[i], plants[i].origin, plants[i].cell, controllers[i].output.position)
+        score(tasks[i], reports[i], rewards, ink, distance)
+        tasks[i].steps += 1
+        observe(plants[i], controllers[i], cells[i], camera, tasks[i], masks[i])
+
+
+@njit(cache=True)
+def observe(plant, controller, cells, camera, task, mask):
+    """Fill what the policy sees: the tool's pose and the camera's mask."""
+    observed_pose(controller, task.pose)
+    render_mask(camera, cells, plant, mask)

@@ -1,0 +1,144 @@
+"""N wiping tasks stepped together: what the single and the vector environment share."""
+
+import numpy as np
+
+from contactsafe.control import presets
+from contactsafe.envs.action import DOWN, action_limits
+from contactsafe.envs.config import WipingConfig
+from contactsafe.envs.step import REWARD_TERMS, nearest_ink, observe, rewards_dtype, step_tasks, task_dtype
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Pose
+from contactsafe.robot.ik import InverseKinematics
+from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
+
+ACTION_SIZE = 18
+
+
+class WipingTasks:
+    """Boards to be wiped, N at a time.
+
+    Args:
+        config: of the task.
+        n: how many.
+        seed: of the sensors' noise; boards and starts are drawn from the generator given to `reset`.
+
+    Attributes:
+        worlds: the simulation below.
+        tasks: array of `task_dtype` records, (n,).
+        step_limit: policy steps of an episode.
+    """
+
+    def __init__(self, config: WipingConfig | None = None, n: int = 1, seed: int | None = None):
+        self.config = config or WipingConfig()
+        self.arm = robots.panda()
+        self.worlds = Worlds(self.arm, self.config.world, presets.by_name(self.config.controller), n, seed)
+        self.tasks = np.zeros(n, dtype=task_dtype)
+        self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
+        self._limits = action_limits(self.config.action, self.config.world.board)
+        self._rewards = np.zeros(1, dtype=rewards_dtype)
+        for name in (*REWARD_TERMS, "force_limit_n", "gentle_n"):
+            self._rewards[name] = getattr(self.config.reward, name)
+        self._rewards["clean_share"] = self.config.clean_share
+        self._actions = np.zeros((n, ACTION_SIZE))
+        self._ik = InverseKinematics(self.arm)
+        x, y, z = self.config.world.board.centre
+        self._q_centre = self._ik.solve(Pose(np.array([x, y, z + 0.05]), DOWN), self.arm.home)
+
+    def reset(self, i: int, rng: np.random.Generator, drawing: np.ndarray | None = None, start=None) -> None:
+        """Begin an episode in task i.
+
+        Args:
+            i: which task.
+            rng: draws board and start.
+            drawing: ink to put on the board, true where ink is, (n, n); drawn at random where None.
+            start: tool position, (3,), m; drawn at random where None.
+        """
+        config, worlds = self.config, self.worlds
+        board = worlds.boards[i]
+        board.clear()
+        if drawing is None:
+            board.draw_random(rng)
+        else:
+            board.draw(drawing)
+        centre = np.array(config.world.board.centre)
+        if start is None:
+            reach = config.start_reach
+            start = centre + [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
+        q = self._ik.solve(Pose(np.asarray(start, dtype=float), DOWN), self._q_centre)
+        worlds.reset(i, q)
+        controller = worlds.controllers[i]
+        target = controller["target"]
+        target["K_task"] = config.action.stiffness_start
+        target["D_task"] = 2.0 * np.sqrt(target["K_task"])
+        controller["output"]["position"] = controller["dynamics"]["position"]
+        controller["output"]["rotation"] = controller["dynamics"]["rotation"]
+        task = self.tasks[i]
+        plant = worlds.plants[i]
+        ink, distance = nearest_ink(worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"])
+        task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
+        task["clean"], task["arm_touched"] = 0, 0
+        observe(plant, controller, worlds.cells[i], worlds.camera, task, worlds.masks[i])
+
+    def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
+        """Run one policy step in every task.
+
+        Args:
+            actions: (n, 18) in [−1, 1]; clipped.
+            traces: `trace_dtype` records to fill, (n, 17); None to record nothing.
+
+        Raises:
+            InvalidInputError: wrong shape, or not finite.
+        """
+        worlds = self.worlds
+        actions = np.asarray(actions, dtype=float)
+        if actions.shape != self._actions.shape:
+            raise InvalidInputError(f"actions have shape {actions.shape}; give {self._actions.shape}")
+        if not np.isfinite(actions).all():
+            raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
+        self._actions[:] = actions
+        ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
+        noise = worlds.draw_noise()
+        traces = worlds.no_trace if traces is None else traces
+        arm = self.arm
+        worlds.in_threads(
+            lambda start, stop: step_tasks(
+                start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
+                worlds.camera, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0], self.tasks,
+                worlds.masks,
+            )
+        )  # fmt: skip
+
+    def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
+        """Give what the policies see, copied: pose float32 (n, 6), mask uint8 (n, size, size, 1)."""
+        return {
+            "pose": self.tasks["pose"][i].astype(np.float32),
+            "mask": self.worlds.masks[i][..., None].copy(),
+        }
+
+    @property
+    def reward(self) -> np.ndarray:
+        """Sum of the reward's terms of the last step, (n,)."""
+        return self.tasks["reward"].sum(axis=1)
+
+    @property
+    def terminated(self) -> np.ndarray:
+        """Whether the board is clean or the arm has met the table, (n,)."""
+        return (self.tasks["clean"] == 1) | (self.tasks["arm_touched"] == 1)
+
+    @property
+    def truncated(self) -> np.ndarray:
+        """Whether time is up, (n,)."""
+        return ~self.terminated & (self.tasks["steps"] >= self.step_limit)
+
+    def info(self) -> dict[str, np.ndarray]:
+        """Give the reward's terms and the episode's figures by name, arrays (n,)."""
+        tasks = self.tasks
+        terms = {f"reward_{name}": tasks["reward"][:, k].copy() for k, name in enumerate(REWARD_TERMS)}
+        return terms | {
+            "ink_left": tasks["ink"] / np.maximum(tasks["ink_start"], 1),
+            "tool_force_n": tasks["force_peak"].copy(),
+            "tool_force_mean_n": tasks["force_mean"].copy(),
+            "is_success": tasks["clean"] == 1,
+            "arm_touched": tasks["arm_touched"] == 1,
+        }
