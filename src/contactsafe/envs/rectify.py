@@ -16,7 +16,7 @@ INK_BELOW = 128
 """A camera pixel darker than this is ink; masks hold 0 and 255 only."""
 
 WINDOW_M = 0.64
-"""Side of the square shown around the tool, m: a little over twice the ink area, so all ink is in view from anywhere."""
+"""Side of the square shown around the tool, m: over twice the ink area, so all ink is in view wherever the tool is."""
 
 SIZE = 128
 """Cells along a side of the view; 5 mm each with the default window."""
@@ -61,7 +61,8 @@ def rectify(masks, tool_positions, homography, window_m=WINDOW_M, size=SIZE):
         raise InvalidInputError(f"homography has shape {homography.shape}; give a finite (3, 3) matrix")
     if not (window_m > 0.0 and size > 0):
         raise InvalidInputError(f"window_m = {window_m} m and size = {size}; both have to be above 0")
-    if abs(np.linalg.det(homography / np.linalg.norm(homography))) < 1e-15:
+    norm = np.linalg.norm(homography)
+    if norm == 0.0 or abs(np.linalg.det(homography / norm)) < 1e-15:
         raise InvalidInputError("homography is singular: the camera would see the board edge-on; check its calibration")
     views = np.empty((masks.shape[0], size, size), dtype=np.uint8)
     _rectify(

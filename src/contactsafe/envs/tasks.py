@@ -65,8 +65,7 @@ class WipingTasks:
         if start is None:
             reach = config.start_reach
             start = centre + [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
-        q = self._ik.solve(Pose(np.asarray(start, dtype=float), DOWN), self._q_centre)
-        worlds.reset(i, q)
+        worlds.reset(i, self.posture_over(Pose(np.asarray(start, dtype=float), DOWN)))
         controller = worlds.controllers[i]
         target = controller["target"]
         target["K_task"] = config.action.stiffness_start
@@ -79,6 +78,10 @@ class WipingTasks:
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
         observe(plant, controller, worlds.cells[i], worlds.camera, task, worlds.masks[i])
+
+    def posture_over(self, pose: Pose) -> np.ndarray:
+        """Find joint positions for a tool pose, near those over the board's centre, (n,), rad."""
+        return self._ik.solve(pose, self._q_centre)
 
     def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
         """Run one policy step in every task.

@@ -108,6 +108,11 @@ class Worlds:
         plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
 
+    def place(self, i: int, q) -> None:
+        """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
+        self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
+        mujoco.mj_kinematics(self.model, self.datas[i])
+
     def close(self) -> None:
         """Stop the threads."""
         if self._threads is not None:
