@@ -1,0 +1,1 @@
+"""The paper's experiments: each returns data (trials, spreads, recordings), none draws."""

@@ -1,0 +1,127 @@
+"""What an experiment gives back: trials with figures, their spread over seeds, and recordings to be drawn."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of one controller.
+
+    Attributes:
+        scenario: what was done, such as 'bottle' or 'push on link 5 while wiping'.
+        controller: preset by name.
+        seed: of board, start, obstacle and noise.
+        metrics: figures by name; the name ends in the unit.
+    """
+
+    scenario: str
+    controller: str
+    seed: int
+    metrics: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A figure over seeds.
+
+    Attributes:
+        median, p5, p95, min, max: of the trials where the figure exists.
+        n: how many those are.
+    """
+
+    median: float
+    p5: float
+    p95: float
+    min: float
+    max: float
+    n: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One trial in time, for plots and films.
+
+    Attributes:
+        scenario, controller, seed: of the trial.
+        trace: `trace_dtype` records, one a millisecond, (T,).
+        boards: the board every `board_every` ticks, uint8 (F, rows, columns); 0 clean, 1 ink, 2 dark object.
+        board_every: ticks between boards.
+        obstacle: radius m and half length m (0 for a sphere) of the obstacle; None without one.
+    """
+
+    scenario: str
+    controller: str
+    seed: int
+    trace: np.ndarray
+    boards: np.ndarray
+    board_every: int
+    obstacle: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Everything one experiment measured.
+
+    Attributes:
+        name: as on the command line, such as 'joint-safety'.
+        question: what it asks, in a sentence.
+        trials: all of them.
+        recordings: of the first seed, one for each scenario and controller that is to be drawn.
+    """
+
+    name: str
+    question: str
+    trials: tuple[Trial, ...]
+    recordings: tuple[Recording, ...] = ()
+
+    def spreads(self) -> dict[str, dict[str, dict[str, Spread]]]:
+        """Gather the trials: scenario → controller → metric → spread over seeds."""
+        values: dict[str, dict[str, dict[str, list[float]]]] = {}
+        for trial in self.trials:
+            row = values.setdefault(trial.scenario, {}).setdefault(trial.controller, {})
+            for name, value in trial.metrics.items():
+                row.setdefault(name, []).append(value)
+        return {
+            scenario: {
+                controller: {name: spread(numbers) for name, numbers in row.items()} for controller, row in rows.items()
+            }
+            for scenario, rows in values.items()
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give question, spreads and trials as plain values for JSON; what does not exist is null."""
+        spreads = {
+            scenario: {
+                controller: {name: _plain(asdict(value)) for name, value in row.items()} for controller, row in rows.items()
+            }
+            for scenario, rows in self.spreads().items()
+        }
+        trials = [_plain(asdict(trial)) for trial in self.trials]
+        return {"question": self.question, "spread": spreads, "trials": trials}
+
+
+def spread(values: list[float]) -> Spread:
+    """Summarise one figure over seeds; trials where it does not exist (NaN) are left out."""
+    numbers = np.array([value for value in values if np.isfinite(value)])
+    if numbers.size == 0:
+        return Spread(*[float("nan")] * 5, 0)
+    p5, median, p95 = np.percentile(numbers, [5, 50, 95])
+    return Spread(float(median), float(p5), float(p95), float(numbers.min()), float(numbers.max()), int(numbers.size))
+
+
+def _plain(value: Any) -> Any:
+    """Make a value fit for strict JSON: NaN becomes null, floats keep six significant digits."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if np.isfinite(value) else None
+    return value
+
+
+def to_json(value: Any) -> str:
+    """Write strict JSON, indented."""
+    return json.dumps(value, indent=1, allow_nan=False)
