@@ -1,0 +1,137 @@
+"""Files that are whole or absent, and training that goes on where it stopped.
+
+Checkpoints are the trainer's own and local; what is shipped is a bundle. They are still read with torch's
+`weights_only`, which takes tensors and plain Python values and runs no code.
+"""
+
+import dataclasses
+import json
+import os
+import random
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from contactsafe.errors import InvalidInputError, OutputError
+
+CHECKPOINT = "checkpoint.pt"
+
+
+def write_atomically(path, write):
+    """Let write(temporary path) make a file, then put it in place of path in one step.
+
+    Args:
+        path: where the file shall be; its folder exists.
+        write: called with the path of a temporary file in the same folder.
+
+    Raises:
+        OutputError: the folder cannot be written to.
+    """
+    path = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        os.close(handle)
+        try:
+            write(name)
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose a folder you may write to") from error
+
+
+def write_json(path, value):
+    """Write plain data as indented JSON, atomically."""
+    text = json.dumps(value, indent=1, default=str) + "\n"
+    write_atomically(path, lambda name: Path(name).write_text(text, encoding="utf-8"))
+
+
+def prepare_folder(out, resume):
+    """Make the folder of a run, or find the one to go on with.
+
+    Args:
+        out: the folder.
+        resume: whether to go on from the checkpoint in it.
+
+    Returns:
+        The folder as a Path.
+
+    Raises:
+        OutputError: it holds a run already and resume is false, or it cannot be made.
+        InvalidInputError: resume is true and there is no checkpoint.
+    """
+    out = Path(out)
+    if resume and not (out / CHECKPOINT).is_file():
+        raise InvalidInputError(f"no {CHECKPOINT} in {out} to resume from; leave --resume out to start anew")
+    if not resume and (out / CHECKPOINT).exists():
+        raise OutputError(f"{out} holds a training run already; give --resume to go on with it, or another --out")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make {out}: {error.strerror}; choose a folder you may write to") from error
+    return out
+
+
+def save_checkpoint(out, state):
+    """Write state (tensors and plain values, nested) as the checkpoint of the run in out, atomically."""
+    write_atomically(Path(out) / CHECKPOINT, lambda name: torch.save(state, name))
+
+
+def load_checkpoint(out):
+    """Read the checkpoint of the run in out.
+
+    Raises:
+        InvalidInputError: it is not a checkpoint this version can read.
+    """
+    path = Path(out) / CHECKPOINT
+    try:
+        return torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:
+        raise InvalidInputError(f"{path} cannot be read as a checkpoint; start anew with another --out") from error
+
+
+def check_same_config(saved, config, may_differ):
+    """Refuse to go on with other settings than the run was started with.
+
+    Args:
+        saved: the settings kept in the checkpoint, as from `plain`.
+        config: the settings now, a dataclass.
+        may_differ: names of fields which may change between sessions.
+
+    Raises:
+        InvalidInputError: a field differs.
+    """
+    for name, now in plain(config).items():
+        if name not in may_differ and saved.get(name) != now:
+            raise InvalidInputError(
+                f"the run was started with {name} = {saved.get(name)}, now it is {now}; "
+                "keep the setting, or start anew with another --out"
+            )
+
+
+def plain(config):
+    """Turn a dataclass into nested dicts and lists of plain values, as JSON would hold it."""
+    return json.loads(json.dumps(dataclasses.asdict(config), default=str))
+
+
+def random_state():
+    """Collect the state of Python's, NumPy's and torch's global random generators."""
+    kind, keys, position, has_gauss, gauss = np.random.get_state(legacy=True)
+    version, internal, gauss_next = random.getstate()
+    return {
+        "torch": torch.get_rng_state(),
+        "numpy": [kind, np.asarray(keys).tolist(), int(position), int(has_gauss), float(gauss)],
+        "python": [version, list(internal), gauss_next],
+    }
+
+
+def restore_random_state(state):
+    """Set the generators to what `random_state` collected."""
+    torch.set_rng_state(state["torch"])
+    kind, keys, position, has_gauss, gauss = state["numpy"]
+    np.random.set_state((kind, np.array(keys, dtype=np.uint32), position, has_gauss, gauss))
+    version, internal, gauss_next = state["python"]
+    random.setstate((version, tuple(internal), gauss_next))

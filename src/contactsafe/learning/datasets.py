@@ -1,0 +1,67 @@
+"""Pictures to train the β-VAE on: boards from full to nearly clean, a bit a pixel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from tqdm import tqdm
+
+from contactsafe.envs.rectify import rectify
+from contactsafe.errors import InvalidInputError
+
+CHUNK = 512
+
+
+@dataclass(frozen=True)
+class MaskDataset:
+    """Binary pictures, packed.
+
+    Attributes:
+        packed: (n, size, size / 8) uint8, a bit a pixel, 1 is ink.
+    """
+
+    packed: np.ndarray
+
+    def __len__(self):
+        return len(self.packed)
+
+    def ink(self, indices):
+        """Unpack the pictures asked for, (len(indices), 1, size, size) float32, 1 is ink."""
+        return np.unpackbits(self.packed[indices], axis=2)[:, None].astype(np.float32)
+
+    def masks(self, indices):
+        """Unpack the pictures asked for as the encoder takes them, (len(indices), size, size) uint8, 0 is ink."""
+        return (1 - np.unpackbits(self.packed[indices], axis=2)) * np.uint8(255)
+
+
+def make_dataset(sample_masks, homography, count, seed, representation, window_m, size):
+    """Draw boards and show each as the encoder will see it.
+
+    Args:
+        sample_masks: `sample_masks(n, seed)` gives camera masks (n, 128, 128) uint8 and tool positions (n, 3) in m.
+        homography: board plane to pixels, (3, 3).
+        count: pictures to make.
+        seed: of the draw; the same seed gives the same pictures.
+        representation: "tool" (rectified to the tool's frame) or "camera" (as the camera sees it).
+        window_m: side of the tool's window, m.
+        size: pixels along a side.
+
+    Returns:
+        A MaskDataset of count pictures.
+
+    Raises:
+        InvalidInputError: representation is unknown, or "camera" masks are not of the given size.
+    """
+    if representation not in ("tool", "camera"):
+        raise InvalidInputError(f'representation is {representation!r}; choose "tool" or "camera"')
+    packed = np.empty((count, size, size // 8), dtype=np.uint8)
+    starts = range(0, count, CHUNK)
+    seeds = np.random.SeedSequence(seed).generate_state(len(starts))
+    for start, chunk_seed in zip(tqdm(starts, desc="drawing boards", unit="chunk"), seeds, strict=True):
+        n = min(CHUNK, count - start)
+        masks, tools = sample_masks(n, int(chunk_seed))
+        if representation == "tool":
+            masks = rectify(masks, tools, homography, window_m, size)
+        elif masks.shape[1:] != (size, size):
+            raise InvalidInputError(f"camera masks are {masks.shape[1:]} but encoder.size is {size}; make them agree")
+        packed[start : start + n] = np.packbits(masks < 128, axis=2)
+    return MaskDataset(packed)

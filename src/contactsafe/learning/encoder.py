@@ -1,0 +1,125 @@
+"""The β-VAE: a mask to a 128-d Gaussian latent and back (paper, section III-F).
+
+Fully convolutional, so a latent number belongs to a place in the picture: two numbers for each cell of an 8 x 8 grid.
+The policy reads "where is ink" off that with a small network; off a dense code it would have to learn geometry first.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from contactsafe.errors import InvalidInputError
+
+LATENT = 128
+"""Numbers in the latent (paper, section IV-A)."""
+
+GRID = 8
+"""Latent cells along a side of the picture."""
+
+MAPS = LATENT // GRID**2
+
+
+@dataclass(frozen=True)
+class EncoderConfig:
+    """Shape of the network.
+
+    Attributes:
+        size: pixels along a side of the picture; a multiple of 32.
+        channels: feature maps after each of the three strided convolutions.
+    """
+
+    size: int = 128
+    channels: tuple[int, int, int] = (12, 16, 32)
+
+    def __post_init__(self):
+        """Refuse a size that the three strides do not bring down to the grid."""
+        if self.size < 32 or self.size % 32:
+            raise InvalidInputError(f"encoder.size = {self.size}; give a multiple of 32")
+
+
+class VAE(nn.Module):
+    """Encoder and decoder over pictures of ink: 1 is ink, 0 is none, (N, 1, size, size) float32."""
+
+    def __init__(self, config: EncoderConfig):
+        super().__init__()
+        self.config = config
+        patch = config.size // (4 * GRID)
+        first, second, third = config.channels
+        self.encoder = nn.Sequential(
+            nn.Conv2d(1, first, patch, patch),
+            nn.ReLU(),
+            nn.Conv2d(first, second, 3, 2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(second, third, 3, 2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(third, 2 * MAPS, 1),
+        )
+        # Plain convolutions, their maps shuffled into place: cheaper than transposed ones, and no checkerboard.
+        self.decoder = nn.Sequential(
+            nn.Conv2d(MAPS, third, 3, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(third, 4 * second, 3, padding=1),
+            nn.PixelShuffle(2),
+            nn.ReLU(),
+            nn.Conv2d(second, 4 * first, 3, padding=1),
+            nn.PixelShuffle(2),
+            nn.ReLU(),
+            nn.Conv2d(first, patch * patch, 1),
+            nn.PixelShuffle(patch),
+        )
+        # Ink is rare: start from a blank page, not from a grey one.
+        nn.init.constant_(self.decoder[-2].bias, -3.0)
+        self.to(memory_format=torch.channels_last)
+
+    def encode(self, ink):
+        """Give mean and log-variance of the latent, each (N, 128)."""
+        mean, log_var = self.encoder(ink).chunk(2, dim=1)
+        return mean.flatten(1), log_var.flatten(1).clamp(-10.0, 4.0)
+
+    def decode(self, latent):
+        """Give the logit of ink at each pixel, (N, 1, size, size)."""
+        return self.decoder(latent.reshape(-1, MAPS, GRID, GRID))
+
+    def forward(self, ink, noise):
+        """Encode, sample with the given standard normal noise (N, 128), decode: (logits, mean, log_var)."""
+        mean, log_var = self.encode(ink)
+        return self.decode(mean + noise * torch.exp(0.5 * log_var)), mean, log_var
+
+
+def vae_loss(logits, ink, mean, log_var, kl_weight, ink_weight):
+    """The paper's (24) with its sign turned, so that less is better, and with ink pixels weighted.
+
+    Thin ink is under one per cent of the pixels: unweighted, the best small code is a blank page.
+
+    Args:
+        logits: log-odds of ink, (N, 1, size, size).
+        ink: the picture, 1 is ink, same shape.
+        mean: of the latent, (N, 128).
+        log_var: of the latent, (N, 128).
+        kl_weight: the paper's β.
+        ink_weight: how many blank pixels one ink pixel counts for.
+
+    Returns:
+        Loss, reconstruction and divergence, each a scalar: sums over a picture, mean over the batch, nat.
+    """
+    weight = torch.as_tensor(ink_weight, dtype=logits.dtype)
+    reconstruction = functional.binary_cross_entropy_with_logits(logits, ink, pos_weight=weight, reduction="sum") / len(
+        ink
+    )
+    divergence = 0.5 * (mean**2 + log_var.exp() - 1.0 - log_var).sum() / len(ink)
+    return reconstruction + kl_weight * divergence, reconstruction, divergence
+
+
+class MaskEncoder(nn.Module):
+    """What is exported: masks (N, size, size) uint8, ink 0, to the latent's mean (N, 128) float32."""
+
+    def __init__(self, vae: VAE):
+        super().__init__()
+        self.vae = vae
+
+    def forward(self, mask):
+        """Scale inside the graph, so that whoever runs it can hand over the mask as it is."""
+        ink = 1.0 - mask.unsqueeze(1).to(torch.float32) / 255.0
+        return self.vae.encode(ink)[0]

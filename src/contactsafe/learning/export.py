@@ -1,0 +1,195 @@
+"""From trained networks to a bundle: exported, compared with torch, sealed, and put in place in one step."""
+
+import os
+import shutil
+import tempfile
+import warnings
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from torch import nn
+
+from contactsafe.errors import BundleError, ContactSafeError, OutputError
+from contactsafe.learning.bundle import ACTIONS, FORMAT, LATENT, MANIFEST, MODELS, POSE, Bundle, digest
+from contactsafe.learning.checkpoints import write_atomically, write_json
+from contactsafe.learning.encoder import MaskEncoder
+from contactsafe.learning.perception import open_session
+
+TOLERANCE = 1e-5
+"""Largest difference between torch and ONNX Runtime that is let pass."""
+
+OPSET = 18
+
+
+class DeployedPolicy(nn.Module):
+    """Raw pose and latent to a clipped action: the scaling and the clipping travel inside the graph.
+
+    Args:
+        layers: the trained network, scaled observation (N, 134) to mean action (N, 18).
+        scaling: the ObservationScaling it was trained with.
+    """
+
+    def __init__(self, layers, scaling):
+        super().__init__()
+        self.layers = layers
+        self.clip = scaling.clip
+        self.register_buffer("centre", torch.tensor(scaling.centre, dtype=torch.float32))
+        self.register_buffer("scale", torch.tensor(scaling.scale, dtype=torch.float32))
+
+    def forward(self, pose, latent):
+        """Give the action, (N, 18) in [-1, 1]."""
+        scaled = (torch.cat([pose, latent], dim=1) - self.centre) / self.scale
+        return self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
+
+
+def to_onnx(module, examples, inputs, output):
+    """Export a module with a free batch size, all weights inside, and no trace of the machine it was made on.
+
+    Args:
+        module: to export.
+        examples: example inputs, one tensor each, batch first.
+        inputs: their names.
+        output: name of the output.
+
+    Returns:
+        The file's bytes.
+    """
+    batch = torch.export.Dim("n", min=1, max=4096)
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore")
+        path = Path(folder) / "model.onnx"
+        torch.onnx.export(
+            module.eval(),
+            tuple(examples),
+            str(path),
+            dynamo=True,
+            external_data=False,
+            opset_version=OPSET,
+            input_names=list(inputs),
+            output_names=[output],
+            dynamic_shapes=tuple({0: batch} for _ in examples),
+            verbose=False,
+        )
+        model = onnx.load(path)
+    # Stack traces and local paths are noted in there; they are nobody's business.
+    for entry in (model, model.graph, *model.graph.node, *model.graph.initializer, *model.graph.value_info):
+        if hasattr(entry, "metadata_props"):
+            del entry.metadata_props[:]
+        entry.doc_string = ""
+    return model.SerializeToString()
+
+
+def compare(module, data, name, examples, inputs):
+    """Refuse an exported model that does not compute what the trained one does.
+
+    Raises:
+        ContactSafeError: outputs differ by more than TOLERANCE, over the examples.
+    """
+    session = open_session(data, name)
+    found = session.run(None, {k: x.numpy() for k, x in zip(inputs, examples, strict=True)})[0]
+    with torch.no_grad():
+        wanted = module.eval()(*examples).numpy()
+    worst = float(np.abs(found - wanted).max())
+    if not worst <= TOLERANCE * max(1.0, float(np.abs(wanted).max())):
+        raise ContactSafeError(
+            f"{name} differs from the trained network by {worst:.1e}, allowed {TOLERANCE}; not written"
+        )
+
+
+def export_encoder(vae, path, size):
+    """Write the encoder of a trained VAE as ONNX, atomically, after comparing it with torch.
+
+    Args:
+        vae: the trained network.
+        path: where to.
+        size: pixels along a side of its picture.
+
+    Raises:
+        ContactSafeError: the exported model computes something else.
+        OutputError: path cannot be written.
+    """
+    encoder = MaskEncoder(vae)
+    generator = torch.Generator().manual_seed(0)
+    examples = (255 * (torch.rand((5, size, size), generator=generator) > 0.02)).to(torch.uint8)
+    data = to_onnx(encoder, [examples[:2]], ["mask"], "latent")
+    compare(encoder, data, str(path), [examples], ["mask"])
+    write_atomically(path, lambda name: Path(name).write_bytes(data))
+
+
+def export_bundle(folder, encoder, layers, scaling, description, force=False):
+    """Write a bundle: both models, bundle.json with their digests, the whole read back before it takes its place.
+
+    Args:
+        folder: where to; made anew.
+        encoder: bytes of encoder.onnx.
+        layers: the trained policy network, scaled observation (N, 134) to mean action (N, 18).
+        scaling: the ObservationScaling it was trained with.
+        description: representation, window_m, view_size, rate_hz, action_repeat, training, results.
+        force: replace a folder that is there.
+
+    Returns:
+        The folder as a Path.
+
+    Raises:
+        OutputError: the folder exists and force is false, or cannot be written.
+        ContactSafeError: the exported policy computes something else than the trained one.
+    """
+    folder = Path(folder)
+    if folder.exists() and not force:
+        raise OutputError(f"{folder} exists; give --force to replace it, or another folder")
+    if folder.exists() and any(folder.iterdir()) and not (folder / MANIFEST).is_file():
+        raise OutputError(f"{folder} is no bundle and will not be replaced; give another folder")
+    module = DeployedPolicy(layers, scaling)
+    generator = torch.Generator().manual_seed(0)
+    examples = [
+        3.0 * torch.randn((64, POSE), generator=generator),
+        3.0 * torch.randn((64, LATENT), generator=generator),
+    ]
+    policy = to_onnx(module, [x[:2] for x in examples], ["pose", "latent"], "action")
+    compare(module, policy, "policy.onnx", examples, ["pose", "latent"])
+    models = dict(zip(MODELS, (encoder, policy), strict=True))
+    manifest = {
+        "format": FORMAT,
+        "task": "contactsafe/Wiping-v0",
+        **description,
+        "actions": list(ACTIONS),
+        "observation_scaling": scaling.as_dict(),
+        "files": {name: {"bytes": len(data), "sha256": digest(data)} for name, data in models.items()},
+        "versions": {name: version(name) for name in ("torch", "stable-baselines3", "onnx", "onnxruntime", "numpy")},
+    }
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {error.strerror}; choose a folder you may write to") from error
+    try:
+        staged.chmod(0o755)
+        for name, data in models.items():
+            (staged / name).write_bytes(data)
+        write_json(staged / MANIFEST, manifest)
+        Bundle.load(staged)
+        _put_in_place(staged, folder)
+    except (OSError, BundleError) as error:
+        raise OutputError(f"cannot write {folder}: {error}; nothing was changed") from error
+    finally:
+        shutil.rmtree(staged, ignore_errors=True)
+    return folder
+
+
+def _put_in_place(staged, folder):
+    """Rename; a folder that was there is moved aside first and brought back if that fails."""
+    if not folder.exists():
+        os.rename(staged, folder)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
+    os.rename(folder, aside / "old")
+    try:
+        os.rename(staged, folder)
+    except OSError:
+        os.rename(aside / "old", folder)
+        raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

@@ -1,0 +1,79 @@
+"""From an observation to the latent, the same in training, in evaluation and on the robot. No torch."""
+
+import numpy as np
+import onnxruntime
+
+from contactsafe.envs.rectify import rectify
+from contactsafe.errors import BundleError, InvalidInputError
+
+REPRESENTATIONS = ("tool", "camera")
+
+
+def open_session(model, name, threads=1):
+    """Start ONNX Runtime on a model held in memory.
+
+    Args:
+        model: the file's bytes.
+        name: what to call it in errors.
+        threads: for one operator; 1 keeps clear of the control loop's core.
+
+    Raises:
+        BundleError: the bytes are no ONNX model, or need operators that are not ONNX's own.
+    """
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    # Threads that spin between calls would eat the core the controller runs on.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    try:
+        return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        reason = str(error).splitlines()[0][:160]
+        raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
+
+
+class Perception:
+    """Masks and tool positions in, latents out.
+
+    Args:
+        session: ONNX Runtime session of the encoder.
+        representation: "tool" shows the encoder the mask in the tool's frame, "camera" as it is.
+        window_m: side of the tool's window, m.
+        size: pixels along a side of what the encoder takes.
+        homography: board plane to camera pixels, (3, 3); not read for "camera".
+    """
+
+    def __init__(self, session, representation, window_m, size, homography):
+        if representation not in REPRESENTATIONS:
+            raise InvalidInputError(f'representation is {representation!r}; choose "tool" or "camera"')
+        self.session = session
+        self.representation = representation
+        self.window_m = window_m
+        self.size = size
+        self.homography = np.array(homography, dtype=np.float64) if representation == "tool" else None
+
+    def __call__(self, masks, tool_positions):
+        """Encode a batch.
+
+        Args:
+            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, ink 0.
+            tool_positions: (N, 2) or wider, m, world; x and y are read.
+
+        Returns:
+            Latents, (N, 128) float32.
+
+        Raises:
+            InvalidInputError: a shape or type differs.
+        """
+        if self.representation == "tool":
+            views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
+        else:
+            views = np.asarray(masks)
+            views = views[..., 0] if views.ndim == 4 else views
+            if views.dtype != np.uint8 or views.shape[1:] != (self.size, self.size):
+                raise InvalidInputError(
+                    f"masks are {views.dtype} of shape {views.shape}; "
+                    f"this encoder takes uint8 (N, {self.size}, {self.size})"
+                )
+        return self.session.run(["latent"], {"mask": views})[0]

@@ -1,0 +1,167 @@
+"""Train the β-VAE on masks from the simulator, report what it keeps of thin ink, and write the encoder."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
+
+from contactsafe.envs.rectify import WINDOW_M
+from contactsafe.learning.checkpoints import (
+    check_same_config,
+    load_checkpoint,
+    plain,
+    prepare_folder,
+    save_checkpoint,
+    write_json,
+)
+from contactsafe.learning.datasets import make_dataset
+from contactsafe.learning.encoder import LATENT, VAE, EncoderConfig, vae_loss
+from contactsafe.learning.export import export_encoder
+from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
+
+HELD_OUT_SEED = 1_000_003
+"""Added to the seed for pictures that are never trained on."""
+
+
+@dataclass(frozen=True)
+class VaeConfig:
+    """Settings of the β-VAE and its training.
+
+    Attributes:
+        out: folder of the run: checkpoint, TensorBoard log, encoder.onnx, vae.json.
+        resume: go on from the checkpoint in out.
+        representation: "tool" encodes the mask in the tool's frame, "camera" the fixed camera's (the paper's).
+        window_m: side of the tool's window, m.
+        encoder: shape of the network.
+        images: pictures to train on.
+        held_out: pictures to report on.
+        epochs: passes over the pictures.
+        batch: pictures in a step.
+        learning_rate: of Adam; falls to a fiftieth along a half cosine.
+        kl_weight: the paper's β.
+        warmup_epochs: over which β rises from 0.
+        ink_weight: how many blank pixels one ink pixel counts for.
+        probe_steps: of fitting the reader of "where is the nearest ink" for the report; 0 for none.
+        seed: of pictures, weights and noise.
+        threads: torch's. More than one crawls as soon as anything else wants a core.
+    """
+
+    out: Path = Path("runs/vae")
+    resume: bool = False
+    representation: Literal["tool", "camera"] = "tool"
+    window_m: float = WINDOW_M
+    encoder: EncoderConfig = field(default_factory=EncoderConfig)
+    images: int = 20_000
+    held_out: int = 2_000
+    epochs: int = 16
+    batch: int = 64
+    learning_rate: float = 2e-3
+    kl_weight: float = 0.3
+    warmup_epochs: int = 4
+    ink_weight: float = 6.0
+    probe_steps: int = 4000
+    seed: int = 0
+    threads: int = 1
+
+
+def train_vae(config, sample_masks, homography):
+    """Train, report and export; a run cut short goes on from its last epoch with `resume`, to the same weights.
+
+    Args:
+        config: a VaeConfig.
+        sample_masks: `sample_masks(n, seed)` gives camera masks (n, 128, 128) uint8 and tool positions (n, 3) in m.
+        homography: board plane to camera pixels, (3, 3).
+
+    Returns:
+        The report written to vae.json, a dict.
+
+    Raises:
+        OutputError: out cannot be written, or holds another run.
+        InvalidInputError: nothing to resume, or settings differ from those the run was started with.
+    """
+    out = prepare_folder(config.out, config.resume)
+    torch.set_num_threads(config.threads)
+    torch.manual_seed(config.seed)
+    vae = VAE(config.encoder)
+    optimiser = torch.optim.Adam(vae.parameters(), lr=config.learning_rate)
+    first_epoch = 0
+    if config.resume:
+        state = load_checkpoint(out)
+        check_same_config(state["config"], config, may_differ=("out", "resume", "threads", "held_out", "probe_steps"))
+        vae.load_state_dict(state["model"])
+        optimiser.load_state_dict(state["optimiser"])
+        first_epoch = state["epochs_done"]
+
+    view = (config.representation, config.window_m, config.encoder.size)
+    data = make_dataset(sample_masks, homography, config.images, config.seed, *view)
+    held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_SEED, *view)
+
+    with SummaryWriter(str(out)) as log:
+        for epoch in range(first_epoch, config.epochs):
+            for name, value in _train_epoch(vae, optimiser, data, epoch, config).items():
+                log.add_scalar(f"train/{name}", value, epoch)
+            state = {"model": vae.state_dict(), "optimiser": optimiser.state_dict()}
+            save_checkpoint(out, {**state, "epochs_done": epoch + 1, "config": plain(config)})
+            for name, value in reconstruction_report(vae, held_out)["all"].items():
+                log.add_scalar(f"held_out/{name}", value, epoch)
+
+    report = _report(vae, data, held_out, config)
+    export_encoder(vae, out / "encoder.onnx", report["size"])
+    write_json(out / "vae.json", report)
+    return report
+
+
+def _train_epoch(vae, optimiser, data, epoch, config):
+    """One pass in an order, and with noise, that depend on seed and epoch alone: so a resumed run is the same run."""
+    order = np.random.default_rng([config.seed, epoch]).permutation(len(data))
+    noise = torch.Generator().manual_seed(config.seed * 100_003 + epoch)
+    steps = max(1, len(data) // config.batch)
+    totals = np.zeros(3)
+    for step in tqdm(range(steps), desc=f"VAE epoch {epoch + 1}/{config.epochs}", unit="batch", mininterval=1.0):
+        progress = epoch + step / steps
+        for group in optimiser.param_groups:
+            falling = 0.5 * (1.0 + math.cos(math.pi * progress / config.epochs))
+            group["lr"] = config.learning_rate * (0.02 + 0.98 * falling)
+        kl_weight = config.kl_weight * min(1.0, progress / max(config.warmup_epochs, 1e-9))
+        ink = torch.from_numpy(data.ink(order[step * config.batch : (step + 1) * config.batch]))
+        logits, mean, log_var = vae(ink, torch.randn((len(ink), LATENT), generator=noise))
+        loss, *parts = vae_loss(logits, ink, mean, log_var, kl_weight, config.ink_weight)
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(vae.parameters(), 1000.0)
+        optimiser.step()
+        totals += [float(loss.detach()), *(float(part.detach()) for part in parts)]
+    return dict(zip(("loss", "reconstruction", "divergence"), totals / steps, strict=True))
+
+
+@torch.no_grad()
+def _latent_statistics(vae, data, count=4096):
+    """Give mean and standard deviation of each latent number over up to count pictures, each (128,)."""
+    parts = batches(min(count, len(data)))
+    means = torch.cat([vae.encode(torch.from_numpy(data.ink(part)))[0] for part in parts])
+    return means.mean(0).numpy(), means.std(0, correction=0).numpy()
+
+
+def _report(vae, data, held_out, config):
+    vae.eval()
+    mean, std = _latent_statistics(vae, data)
+    report = {
+        "format": 1,
+        "representation": config.representation,
+        "window_m": config.window_m,
+        "size": config.encoder.size,
+        "latent_mean": mean.tolist(),
+        "latent_std": std.tolist(),
+        # Burda et al. 2016: a number is in use if its mean moves with the picture, variance above 0.01.
+        "active_latents": int((std**2 > 0.01).sum()),
+        "reconstruction": reconstruction_report(vae, held_out),
+        "config": plain(config),
+    }
+    if config.representation == "tool" and config.probe_steps:
+        report["nearest_ink"] = nearest_ink_error(vae, data, held_out, config.window_m, config.probe_steps, config.seed)
+    return report

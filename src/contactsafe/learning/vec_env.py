@@ -1,0 +1,182 @@
+"""The wiping task as Stable-Baselines3 sees it: N environments, observations already encoded and scaled."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.learning.evaluation import step_values
+
+MIN_STD = 0.2
+"""A latent number that hardly moves is not blown up to unit variance: it would be noise."""
+
+
+@dataclass(frozen=True)
+class ObservationScaling:
+    """Fixed scaling of [pose, latent]; nothing that runs along, so nothing to be forgotten beside a policy.
+
+    Attributes:
+        centre: (134,) subtracted first.
+        scale: (134,) divided by.
+        clip: largest magnitude afterwards.
+    """
+
+    centre: tuple[float, ...]
+    scale: tuple[float, ...]
+    clip: float = 8.0
+
+    @classmethod
+    def from_statistics(cls, pose_centre, pose_scale, latent_mean, latent_std, clip=8.0):
+        """Join the pose's stated scaling with the latent's measured one."""
+        centre = [*pose_centre, *latent_mean]
+        scale = [*pose_scale, *np.maximum(latent_std, MIN_STD)]
+        return cls(tuple(float(c) for c in centre), tuple(float(s) for s in scale), clip)
+
+    def __call__(self, pose, latent):
+        """Scale: (N, 6) and (N, 128) to (N, 134) float32."""
+        raw = np.concatenate([pose, latent], axis=1)
+        centre, scale = np.asarray(self.centre, np.float32), np.asarray(self.scale, np.float32)
+        return np.clip((raw - centre) / scale, -self.clip, self.clip).astype(np.float32)
+
+    def as_dict(self):
+        """Give centre, scale and clip as plain values."""
+        return {"centre": list(self.centre), "scale": list(self.scale), "clip": self.clip}
+
+
+class EncodedVecEnv(VecEnv):
+    """Adapter from a gymnasium VectorEnv with Dict(pose, mask) to Stable-Baselines3.
+
+    A time limit is reported as such (`TimeLimit.truncated` and `terminal_observation`), so PPO bootstraps there and
+    takes only a true end for an end.
+
+    Args:
+        env: the VectorEnv; its autoreset mode is SAME_STEP.
+        perception: `perception(masks, tool_positions)` gives latents.
+        scaling: the ObservationScaling.
+        action_repeat: environment steps for which one action is given; their rewards are summed.
+        reward_scale: rewards are multiplied by this; the metrics are not.
+
+    Attributes:
+        finished: metrics of the last 100 episodes, a dict each: return, steps, success, ink_left, force_mean_n,
+            force_peak_n, and the sum of each term of the reward.
+
+    Raises:
+        InvalidInputError: the environment resets in another mode, or action_repeat is below 1.
+    """
+
+    def __init__(self, env, perception, scaling, action_repeat=1, reward_scale=1.0):
+        if env.metadata.get("autoreset_mode") != AutoresetMode.SAME_STEP:
+            raise InvalidInputError(
+                f"the environment resets by {env.metadata.get('autoreset_mode')}; make it with AutoresetMode.SAME_STEP"
+            )
+        if action_repeat < 1:
+            raise InvalidInputError(f"action_repeat = {action_repeat}; give 1 or more")
+        self.env = env
+        self.perception = perception
+        self.scaling = scaling
+        self.action_repeat = action_repeat
+        self.reward_scale = reward_scale
+        self.finished: deque[dict] = deque(maxlen=100)
+        box = gymnasium.spaces.Box(-scaling.clip, scaling.clip, (len(scaling.centre),), np.float32)
+        super().__init__(env.num_envs, box, env.single_action_space)
+        self._actions = np.zeros((env.num_envs, *env.single_action_space.shape), np.float32)
+        self._seed = None
+        self._tally = {}
+        self._steps = np.zeros(self.num_envs, int)
+
+    def _encode(self, observation):
+        pose = np.asarray(observation["pose"], np.float32)
+        return self.scaling(pose, self.perception(observation["mask"], pose))
+
+    def seed(self, seed=None):
+        """Seed the next reset; environment i gets its own seed from it."""
+        self._seed = seed
+        return [seed] * self.num_envs
+
+    def reset(self):
+        """Start new episodes everywhere; observation (N, 134)."""
+        observation, _ = self.env.reset(seed=self._seed)
+        self._seed = None
+        self._tally = {}
+        self._steps[:] = 0
+        self.reset_infos: list[dict] = [{} for _ in range(self.num_envs)]
+        return self._encode(observation)
+
+    def step_async(self, actions):
+        """Keep the actions for step_wait."""
+        self._actions = np.asarray(actions, np.float32)
+
+    def step_wait(self):
+        """Step: observation (N, 134), reward (N,), done (N,), one info dict each."""
+        rewards = np.zeros(self.num_envs, np.float32)
+        ended = np.zeros(self.num_envs, bool)
+        infos: list[dict] = [{} for _ in range(self.num_envs)]
+        actions = self._actions
+        for _ in range(self.action_repeat):
+            observation, reward, terminated, truncated, info = self.env.step(actions)
+            done = np.asarray(terminated) | np.asarray(truncated)
+            # What the next episode earns while the others finish their repeats belongs to neither transition.
+            rewards[~ended] += np.asarray(reward)[~ended]
+            self._count(reward, done, info)
+            if done.any():
+                self._close(done, np.asarray(terminated), info, infos)
+                ended |= done
+                actions = np.where(ended[:, None], np.float32(0.0), actions)
+        return self._encode(observation), self.reward_scale * rewards, ended, infos
+
+    def _count(self, reward, done, info):
+        self._steps += 1
+        force = step_values(info, done, "tool_force_n")
+        sums = {"return": np.asarray(reward, float), "force_mean_n": force}
+        terms = [k for k in (*info, *info.get("final_info", {})) if k.startswith("reward_")]
+        sums |= {key: step_values(info, done, key) for key in terms}
+        for key, value in sums.items():
+            self._tally[key] = self._tally.get(key, 0.0) + value
+        self._tally["force_peak_n"] = np.maximum(self._tally.get("force_peak_n", 0.0), force)
+
+    def _close(self, done, terminated, info, infos):
+        last = {key: step_values(info, done, key) for key in ("ink_left", "is_success")}
+        rows = np.flatnonzero(done)
+        final = info["final_obs"]
+        final = {k: np.stack([final[i][k] for i in rows]) for k in ("pose", "mask")}
+        encoded = self._encode(final)
+        for row, i in enumerate(rows):
+            metrics = {key: float(value[i]) for key, value in self._tally.items()}
+            metrics |= {"steps": int(self._steps[i]), "ink_left": float(last["ink_left"][i])}
+            metrics["success"] = bool(last["is_success"][i])
+            metrics["force_mean_n"] /= metrics["steps"]
+            self.finished.append(metrics)
+            infos[i] = {
+                "terminal_observation": encoded[row],
+                "TimeLimit.truncated": not terminated[i],
+                "is_success": metrics["success"],
+                "episode": {"r": metrics["return"], "l": metrics["steps"], "t": 0.0},
+            }
+        for value in self._tally.values():
+            value[done] = 0.0
+        self._steps[done] = 0
+
+    def close(self):
+        """Close the environment below."""
+        self.env.close()
+
+    def get_attr(self, attr_name, indices=None):
+        """Read an attribute of the environment below, the same for each index."""
+        value = None if attr_name == "render_mode" else getattr(self.env, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name, value, indices=None):
+        """Set an attribute of the environment below."""
+        setattr(self.env, attr_name, value)
+
+    def env_method(self, method_name, *args, indices=None, **kwargs):
+        """Call a method of the environment below, once."""
+        return [getattr(self.env, method_name)(*args, **kwargs)]
+
+    def env_is_wrapped(self, wrapper_class, indices=None):
+        """Say whether single environments are wrapped: they are not, they are native."""
+        return [False for _ in self._get_indices(indices)]

@@ -1,0 +1,247 @@
+"""Bundles: exported, sealed, run; and what a damaged one is told."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.train
+torch = pytest.importorskip("torch")
+onnx = pytest.importorskip("onnx")
+
+from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
+
+from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
+from contactsafe.learning.bundle import Bundle, digest  # noqa: E402
+from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
+from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
+from contactsafe.learning.policy import Policy  # noqa: E402
+from contactsafe.learning.vec_env import ObservationScaling  # noqa: E402
+
+H = camera_homography()
+DESCRIPTION = {
+    "representation": "tool",
+    "window_m": 0.64,
+    "view_size": 32,
+    "rate_hz": 60.0,
+    "action_repeat": 1,
+    "training": {},
+    "results": {},
+}
+
+
+def networks():
+    torch.manual_seed(0)
+    layers = torch.nn.Sequential(torch.nn.Linear(134, 16), torch.nn.Tanh(), torch.nn.Linear(16, 18))
+    torch.nn.init.normal_(layers[-1].weight, std=2.0)
+    scaling = ObservationScaling.from_statistics((0.5, 0, 0, 0, 0, 0), (0.1,) * 6, np.zeros(128), np.ones(128))
+    return VAE(EncoderConfig(size=32, channels=(4, 4, 8))), layers, scaling
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bundle")
+    vae, layers, scaling = networks()
+    export_encoder(vae, folder / "encoder.onnx", 32)
+    encoder = (folder / "encoder.onnx").read_bytes()
+    return export_bundle(folder / "wiping", encoder, layers, scaling, DESCRIPTION)
+
+
+@pytest.fixture
+def bundle(exported, tmp_path):
+    return shutil.copytree(exported, tmp_path / "bundle")
+
+
+def observations(n=5):
+    masks, tools = sample_masks(n, 1)
+    pose = np.zeros((n, 6), np.float32)
+    pose[:, :3] = tools
+    return {"pose": pose, "mask": masks[..., None]}
+
+
+def refusal(folder):
+    with pytest.raises(BundleError) as error:
+        Bundle.load(folder)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def reseal(folder, name):
+    manifest = json.loads((folder / "bundle.json").read_text())
+    data = (folder / name).read_bytes()
+    manifest["files"][name] = {"bytes": len(data), "sha256": digest(data)}
+    (folder / "bundle.json").write_text(json.dumps(manifest))
+
+
+def rewrite(folder, **fields):
+    manifest = {**json.loads((folder / "bundle.json").read_text()), **fields}
+    (folder / "bundle.json").write_text(json.dumps(manifest))
+
+
+def test_acts_as_the_trained_networks_do(exported):
+    from contactsafe.envs.rectify import rectify
+
+    vae, layers, scaling = networks()
+    seen = observations()
+    with torch.no_grad():
+        views = torch.from_numpy(rectify(seen["mask"], seen["pose"], H, 0.64, 32))
+        latent = MaskEncoder(vae)(views)
+        scaled = torch.from_numpy(scaling(seen["pose"], latent.numpy()))
+        wanted = layers(scaled).clamp(-1, 1).numpy()
+    np.testing.assert_allclose(Policy(exported, H).act(seen), wanted, atol=1e-5)
+    assert (np.abs(wanted) == 1.0).any()
+
+
+def test_one_or_many_the_same_again_and_clipped(exported):
+    policy, seen = Policy(exported, H), observations()
+    actions = policy.act(seen)
+    assert actions.shape == (5, 18)
+    assert actions.dtype == np.float32
+    assert np.abs(actions).max() <= 1.0
+    np.testing.assert_array_equal(actions, policy.act(seen))
+    for i in range(5):
+        one = policy.act({key: value[i] for key, value in seen.items()})
+        assert one.shape == (18,)
+        np.testing.assert_allclose(one, actions[i], atol=1e-5)
+    assert (policy.rate_hz, policy.action_repeat) == (60.0, 1)
+
+
+def test_camera_and_board_moved_with_a_new_calibration_change_nothing_but_the_pose(exported):
+    """In the tool's frame the camera may stand elsewhere: the latent comes from board coordinates."""
+    policy = Policy(exported, 3.0 * H)
+    np.testing.assert_array_equal(policy.act(observations()), Policy(exported, H).act(observations()))
+
+
+def test_bad_observations_are_refused(exported):
+    policy, seen = Policy(exported, H), observations()
+    with pytest.raises(InvalidInputError) as error:
+        policy.act({**seen, "pose": np.zeros((5, 7))})
+    assert str(error.value) == (
+        "pose has shape (5, 7) and mask (5, 128, 128, 1); give (6,) and (128, 128, 1), or N of each"
+    )
+    seen["pose"][2, 1] = np.nan
+    with pytest.raises(InvalidInputError) as error:
+        policy.act(seen)
+    assert str(error.value) == "pose is not finite; check the robot state before asking the policy"
+    with pytest.raises(InvalidInputError):
+        Policy(exported, np.zeros((3, 3)))
+
+
+def test_missing(bundle):
+    assert refusal(bundle / "no") == (
+        f"no bundle at {bundle}/no: not a folder; give the path of a folder that holds bundle.json"
+    )
+    (bundle / "policy.onnx").unlink()
+    assert refusal(bundle) == f"{bundle}/policy.onnx is missing; the bundle is incomplete, copy or export it anew"
+
+
+def test_one_bit_tampered(bundle):
+    data = bytearray((bundle / "policy.onnx").read_bytes())
+    data[len(data) // 2] ^= 1
+    (bundle / "policy.onnx").write_bytes(data)
+    assert refusal(bundle) == (
+        f"{bundle}/policy.onnx is not the file bundle.json was written for (size or SHA-256 differ); "
+        "copy or export the bundle anew"
+    )
+
+
+def test_too_large(bundle):
+    with open(bundle / "encoder.onnx", "ab") as file:
+        file.truncate(17_000_000)
+    assert refusal(bundle) == (
+        f"{bundle}/encoder.onnx has 17000000 bytes, at most 16000000 are allowed; this is not a bundle of ours"
+    )
+
+
+def test_manifest_damaged(bundle):
+    path = bundle / "bundle.json"
+    whole = path.read_text()
+    path.write_text(whole[:100])
+    assert refusal(bundle) == f"{path} is not JSON; the bundle is damaged, copy or export it anew"
+    path.write_text("[" * 100_000)
+    assert refusal(bundle) == f"{path} is not JSON; the bundle is damaged, copy or export it anew"
+    path.write_text("[]")
+    assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
+    path.write_text(whole)
+    rewrite(bundle, format=99)
+    assert refusal(bundle) == f"{path} has format 99, this version reads 1; export it anew, or upgrade"
+    rewrite(bundle, format=1, rate_hz="60")
+    assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
+    rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
+    assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"
+    rewrite(bundle, window_m=0.64, actions=["x"])
+    assert refusal(bundle) == (
+        f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade"
+    )
+
+
+def test_not_a_model(bundle):
+    (bundle / "policy.onnx").write_bytes(b"garbage" * 10)
+    reseal(bundle, "policy.onnx")
+    assert refusal(bundle).startswith(f"{bundle}/policy.onnx is not a model ONNX Runtime takes (")
+
+
+def test_wrong_ports(bundle):
+    shutil.copy(bundle / "encoder.onnx", bundle / "policy.onnx")
+    reseal(bundle, "policy.onnx")
+    assert refusal(bundle) == (
+        f"{bundle}/policy.onnx: input pose is absent, not tensor(float) of shape (N, 6); export the bundle anew"
+    )
+
+
+def test_operators_of_a_foreign_domain_are_refused(bundle):
+    model = onnx.load(bundle / "policy.onnx")
+    model.graph.node[0].domain = "com.evil"
+    model.opset_import.append(onnx.helper.make_opsetid("com.evil", 1))
+    (bundle / "policy.onnx").write_bytes(model.SerializeToString())
+    reseal(bundle, "policy.onnx")
+    assert refusal(bundle).startswith(f"{bundle}/policy.onnx is not a model ONNX Runtime takes (")
+
+
+def test_weights_in_another_file_are_refused(bundle):
+    model = onnx.load(bundle / "policy.onnx")
+    onnx.save_model(model, bundle / "policy.onnx", save_as_external_data=True, location="weights.bin", size_threshold=0)
+    reseal(bundle, "policy.onnx")
+    assert refusal(bundle) == (f"{bundle}/policy.onnx keeps weights in another file; export it with the weights inside")
+
+
+def test_exported_models_carry_no_paths(exported):
+    for name in ("encoder.onnx", "policy.onnx"):
+        data = (exported / name).read_bytes()
+        assert b".py" not in data
+        assert b"/" + b"tmp" not in data
+
+
+def test_export_does_not_overwrite_unasked_and_leaves_nothing_behind(bundle, tmp_path):
+    _, layers, scaling = networks()
+    encoder = (bundle / "encoder.onnx").read_bytes()
+    before = (bundle / "bundle.json").read_bytes()
+    with pytest.raises(OutputError) as error:
+        export_bundle(bundle, encoder, layers, scaling, DESCRIPTION)
+    assert str(error.value) == f"{bundle} exists; give --force to replace it, or another folder"
+    with pytest.raises(OutputError, match="nothing was changed"):
+        export_bundle(bundle, b"no model", layers, scaling, DESCRIPTION, force=True)
+    assert (bundle / "bundle.json").read_bytes() == before
+    export_bundle(bundle, encoder, layers, scaling, {**DESCRIPTION, "rate_hz": 30.0}, force=True)
+    assert Bundle.load(bundle).rate_hz == 30.0
+    other = tmp_path / "precious"
+    other.mkdir()
+    (other / "thesis.tex").write_text("years of work")
+    with pytest.raises(OutputError) as error:
+        export_bundle(other, encoder, layers, scaling, DESCRIPTION, force=True)
+    assert str(error.value) == f"{other} is no bundle and will not be replaced; give another folder"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bundle", "precious"]
+
+
+def test_a_model_that_computes_something_else_is_not_written(bundle):
+    _, layers, scaling = networks()
+    module = DeployedPolicy(layers, scaling)
+    examples = [torch.zeros(2, 6), torch.zeros(2, 128)]
+    data = to_onnx(module, examples, ["pose", "latent"], "action")
+    with torch.no_grad():
+        layers[-1].bias += 0.1
+    with pytest.raises(
+        ContactSafeError, match=r"^policy differs from the trained network by .*, allowed 1e-05; not written$"
+    ):
+        compare(module, data, "policy", examples, ["pose", "latent"])

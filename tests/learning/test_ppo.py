@@ -1,0 +1,202 @@
+"""PPO on a board without physics: the adapter's bookkeeping, resuming, and the bundle at the end."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.train
+torch = pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+from tests.learning.fakes import BOARD, FakeWiping, camera_homography, sample_masks  # noqa: E402
+
+from contactsafe.errors import InvalidInputError  # noqa: E402
+from contactsafe.learning.bundle import Bundle  # noqa: E402
+from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
+from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
+from contactsafe.learning.train_ppo import PpoConfig, train_ppo  # noqa: E402
+from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
+from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling  # noqa: E402
+
+SCALING = ObservationScaling.from_statistics((0.5, 0, 0, 0, 0, 0), (0.15,) * 6, np.zeros(128), np.ones(128))
+
+
+def no_perception(masks, poses):
+    return np.zeros((len(masks), 128), np.float32)
+
+
+def make_adapter(**options):
+    env = FakeWiping(3, max_steps=5)
+    adapter = EncodedVecEnv(env, no_perception, SCALING, **options)
+    adapter.seed(0)
+    return env, adapter
+
+
+def test_time_limit_is_not_an_end_and_its_last_observation_is_given():
+    env, adapter = make_adapter()
+    adapter.reset()
+    action = np.zeros((3, 18), np.float32)
+    for _ in range(4):
+        _, _, done, infos = adapter.step(action)
+        assert not done.any()
+        assert infos == [{}, {}, {}]
+    before = env.xy.copy()
+    observation, _, done, infos = adapter.step(action)
+    assert done.all()
+    for i, info in enumerate(infos):
+        assert info["TimeLimit.truncated"] is True
+        assert info["episode"]["l"] == 5
+        expected = (before[i] - [0.5, 0.0]) / 0.15
+        np.testing.assert_allclose(info["terminal_observation"][:2], expected, atol=1e-5)
+        assert not np.allclose(observation[i], info["terminal_observation"])
+
+
+def test_a_clean_board_is_an_end():
+    env, adapter = make_adapter()
+    adapter.reset()
+    env.boards[1].points = env.xy[1][None] + [[0.001, 0.0]]
+    _, reward, done, infos = adapter.step(np.zeros((3, 18), np.float32))
+    assert done.tolist() == [False, True, False]
+    assert infos[1]["TimeLimit.truncated"] is False
+    assert infos[1]["is_success"] is True
+    assert reward[1] > 0.0
+    assert adapter.finished[0]["ink_left"] == 0.0
+    assert adapter.finished[0]["reward_ink"] == pytest.approx(reward[1])
+
+
+def test_metrics_are_of_the_episode_and_start_anew():
+    _, adapter = make_adapter()
+    adapter.reset()
+    total = np.zeros(3)
+    for step in range(10):
+        _, reward, _, _ = adapter.step(np.full((3, 18), 0.5, np.float32))
+        total += reward
+        if step == 4:
+            first, total = total, np.zeros(3)
+    returns = [episode["return"] for episode in adapter.finished]
+    np.testing.assert_allclose(returns, [*first, *total], atol=1e-5)
+    assert {episode["force_mean_n"] for episode in adapter.finished} == {3.0}
+    for episode in adapter.finished:
+        assert episode["reward_ink"] + episode["reward_approach"] == pytest.approx(episode["return"], abs=1e-5)
+
+
+def test_repeated_actions_sum_their_rewards_and_stop_at_the_end_of_an_episode():
+    _, single = make_adapter()
+    _, repeated = make_adapter(action_repeat=3)
+    single.reset(), repeated.reset()
+    action = np.full((3, 18), 0.3, np.float32)
+    three = sum(single.step(action)[1] for _ in range(3))
+    _, reward, done, _ = repeated.step(action)
+    np.testing.assert_allclose(reward, three, rtol=1e-5)
+    assert not done.any()
+    two = sum(single.step(action)[1] for _ in range(2))
+    _, reward, done, infos = repeated.step(action)
+    assert done.all()
+    np.testing.assert_allclose(reward, two, rtol=1e-5)
+    assert [info["episode"]["l"] for info in infos] == [5, 5, 5]
+
+
+def test_reward_scale_scales_rewards_and_not_the_log():
+    _, plain = make_adapter()
+    _, scaled = make_adapter(reward_scale=0.1)
+    plain.reset(), scaled.reset()
+    action = np.full((3, 18), 0.3, np.float32)
+    for _ in range(5):
+        np.testing.assert_allclose(scaled.step(action)[1], 0.1 * plain.step(action)[1], rtol=1e-5)
+    assert plain.finished[0]["return"] == pytest.approx(scaled.finished[0]["return"])
+
+
+def test_what_the_adapter_refuses():
+    env = FakeWiping(2)
+    env.metadata = {"autoreset_mode": "NEXT_STEP"}
+    with pytest.raises(InvalidInputError) as error:
+        EncodedVecEnv(env, no_perception, SCALING)
+    assert str(error.value) == "the environment resets by NEXT_STEP; make it with AutoresetMode.SAME_STEP"
+    with pytest.raises(InvalidInputError) as error:
+        EncodedVecEnv(FakeWiping(2), no_perception, SCALING, action_repeat=0)
+    assert str(error.value) == "action_repeat = 0; give 1 or more"
+
+
+@pytest.fixture(scope="module")
+def vae(tmp_path_factory):
+    out = tmp_path_factory.mktemp("vae") / "run"
+    encoder = EncoderConfig(size=32, channels=(4, 4, 8))
+    config = VaeConfig(out=out, encoder=encoder, images=64, held_out=16, epochs=1, batch=16, threads=1, probe_steps=0)
+    train_vae(config, sample_masks, camera_homography())
+    return out
+
+
+def ppo_config(vae, out, **changes):
+    settings = {"num_envs": 4, "total_steps": 256, "rollout_steps": 16, "batch": 32, "epochs": 2, "net": (16, 16)}
+    settings |= {"checkpoint_rollouts": 1, "evaluate_episodes": 4}
+    return PpoConfig(vae=vae, out=out, **{**settings, **changes})
+
+
+def test_trains_resumes_and_ships(vae, tmp_path):
+    config = ppo_config(vae, tmp_path / "run")
+    results = train_ppo(config, FakeWiping)
+    assert results["episodes"] == 4
+    state = load_checkpoint(config.out)
+    assert state["steps"] == 256
+    longer = dataclasses.replace(config, resume=True, total_steps=512)
+    train_ppo(longer, FakeWiping)
+    resumed = load_checkpoint(config.out)
+    assert resumed["steps"] == 512
+    assert resumed["updates"] == 2 * state["updates"] == 16
+    assert not torch.equal(resumed["policy"]["action_net.weight"], state["policy"]["action_net.weight"])
+    manifest = Bundle.load(config.out / "bundle").manifest
+    assert manifest["training"]["steps"] == 512
+    assert manifest["training"]["ppo"]["discount"] == 0.995
+    assert manifest["results"]["episodes"] == 4
+    assert "records" not in manifest["results"]
+    assert list(config.out.glob("events.out.tfevents*"))
+    json.loads((config.out / "config.json").read_text())
+    with pytest.raises(InvalidInputError, match=r"the run was started with discount = 0\.995, now it is 0\.9"):
+        train_ppo(dataclasses.replace(longer, discount=0.9), FakeWiping)
+
+
+def test_resuming_restores_policy_optimiser_and_chance(vae, tmp_path):
+    """A finished run, resumed with nothing left to do, exports the policy of its checkpoint."""
+    config = ppo_config(vae, tmp_path / "run", evaluate_episodes=0)
+    train_ppo(config, FakeWiping)
+    before = (config.out / "bundle" / "policy.onnx").read_bytes()
+    train_ppo(dataclasses.replace(config, resume=True), FakeWiping)
+    assert (config.out / "bundle" / "policy.onnx").read_bytes() == before
+
+
+def test_stops_in_time_and_keeps_what_it_has(vae, tmp_path):
+    config = ppo_config(vae, tmp_path / "run", total_steps=10_000_000, max_minutes=0.02, evaluate_episodes=0)
+    train_ppo(config, FakeWiping)
+    assert 0 < load_checkpoint(config.out)["steps"] < 10_000_000
+    Bundle.load(config.out / "bundle")
+
+
+def test_without_an_encoder_it_says_what_to_do(tmp_path):
+    with pytest.raises(InvalidInputError) as error:
+        train_ppo(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
+    assert str(error.value) == (
+        f"{tmp_path} holds no trained encoder (encoder.onnx, vae.json); run `contactsafe train vae` first"
+    )
+    assert not (tmp_path / "run").exists()
+
+
+def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
+    """With the ink's place readable off the observation, a few thousand steps must pay."""
+
+    class Sighted(FakeWiping):
+        def _observe(self):
+            seen = super()._observe()
+            for i, board in enumerate(self.boards):
+                nearest = board.points[np.abs(board.points - self.xy[i]).sum(axis=1).argmin()] if board.left else BOARD
+                seen["pose"][i, 3:5] = nearest - self.xy[i]
+            return seen
+
+    config = ppo_config(
+        vae, tmp_path / "run", num_envs=16, total_steps=12_288, rollout_steps=32, batch=128, epochs=6,
+        learning_rate=2e-3, net=(64, 64), target_kl=0.05, pose_scale=(0.15, 0.15, 0.03, 0.05, 0.05, 0.1),
+        discount=0.95, checkpoint_rollouts=100, evaluate_episodes=16,
+    )  # fmt: skip
+    results = train_ppo(config, lambda n: Sighted(n, max_steps=40))
+    assert results["ink_removed_mean"] > 0.6
