@@ -28,7 +28,7 @@ class ControllerConfig:
         push_hold_nm: the same while something pushes the arm, N m; inf for none.
         work_memory_s: time over which work exchanged with the contact is remembered, s.
         work_hold_j: net work received from the contact that tells a pusher from an obstacle, J.
-        work_yield_j: net work put into the contact that tells an obstacle from a pusher, J.
+        hold_rise: the arm yields again when, doing the work itself, it meets this many times the torque of the pusher.
         friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
         stiffness_range: allowed K_task, 1/s².
         damping_range: allowed D_task, 1/s.
@@ -56,7 +56,7 @@ class ControllerConfig:
     push_hold_nm: float = math.inf
     work_memory_s: float = 0.3
     work_hold_j: float = 0.02
-    work_yield_j: float = 0.02
+    hold_rise: float = 1.5
     friction_compensation: bool = True
     stiffness_range: tuple[float, float] = (10.0, 1500.0)
     damping_range: tuple[float, float] = (2.0, 120.0)

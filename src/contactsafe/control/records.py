@@ -57,7 +57,7 @@ def params_dtype(n: int) -> np.dtype:
     """Describe a configuration resolved for one arm: per-joint arrays, per-tick factors."""
     scalars = (
         "trigger_share", "observer_share", "lowpass_share", "residual_threshold", "null_damping", "contact_damping",
-        "push_yield_nm", "push_hold_nm", "work_keep", "work_hold_j", "work_yield_j",
+        "push_yield_nm", "push_hold_nm", "work_keep", "work_hold_j", "hold_rise",
         "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin", "joint_stop_stiffness",
         "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step", "dt",
     )  # fmt: skip
@@ -86,7 +86,10 @@ def state_dtype(n: int) -> np.dtype:
             ("mode", _i),
             ("mode_ticks", _i),  # ticks spent in the mode
             ("work_j", _f),  # net work received from the contact, fading, J
+            ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
+            ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
             ("holding", _i),  # 1 while something pushes the arm
+            ("held_nm", _f),  # largest |residual| shown by what pushes, N m
             ("fault", _i),  # first fault since reset
             ("bad_ticks", _i),  # unusable measurements in a row
         ]
@@ -136,7 +139,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     dt = config.dt
     for name in (
         "residual_threshold", "null_damping", "contact_damping", "push_yield_nm", "push_hold_nm", "work_hold_j",
-        "work_yield_j", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
+        "hold_rise", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
         "manipulability_floor", "manipulability_damping", "dt", "contact_aware", "cancel_tool_wrench",
         "friction_compensation",
     ):  # fmt: skip

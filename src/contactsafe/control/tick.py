@@ -160,28 +160,48 @@ def _link_in_contact(residual, threshold):
 
 @njit(cache=True)
 def _supervise(c):
-    """Choose the mode, with dwell; while in contact, tell a pusher from an obstacle by who has done the work.
-
-    A passive obstacle never gives back more than was put into it, so only a net gain of work marks a pusher.
-    """
+    """Choose the mode, with dwell; while in contact, tell what pushes the arm from what it ran into."""
     state, params = c.state, c.params
     link = _link_in_contact(state.residual_trigger, params.residual_threshold)
     state.mode_ticks += 1
     if state.mode == FREE:
         if link != 0 and params.contact_aware != 0:
-            state.mode, state.mode_ticks = CONTACT, 0
-            state.work_j, state.holding = 0.0, 0
+            _enter(state, CONTACT)
     elif link == 0 and state.mode_ticks >= params.dwell_ticks:
-        state.mode, state.mode_ticks = FREE, 0
-        state.work_j, state.holding = 0.0, 0
-    if state.mode == CONTACT:
-        power = dot(state.residual_trigger, c.measurement.qd)
-        state.work_j = params.work_keep * state.work_j + power * params.dt
-        if state.work_j > params.work_hold_j:
-            state.holding = 1
-        elif state.work_j < -params.work_yield_j:
-            state.holding = 0
+        _enter(state, FREE)
+    _watch_work(c)
     c.output.link = link
+
+
+@njit(cache=True)
+def _enter(state, mode):
+    state.mode, state.mode_ticks = mode, 0
+    state.work_j, state.holding, state.held_nm = 0.0, 0, 0.0
+
+
+@njit(cache=True)
+def _watch_work(c):
+    """Decide between holding and yielding by the work exchanged with the contact.
+
+    Something passive never gives back more than was put into it: only a pusher brings the net work above zero. Once
+    holding, the arm yields again where the torque rises well above what the pusher showed while the arm does the work:
+    that is running into something. Torque and velocity pass the same filters, or the torque's lag would look like work.
+    """
+    state, params = c.state, c.params
+    observer_step(state.velocity_observed, params.trigger_share, c.measurement.qd)
+    observer_step(state.velocity_seen, params.lowpass_share, state.velocity_observed)
+    if state.mode != CONTACT:
+        return
+    power = dot(state.residual_trigger, state.velocity_seen)
+    size = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
+    state.work_j = params.work_keep * state.work_j + power * params.dt
+    if state.holding == 0:
+        if state.work_j > params.work_hold_j:
+            state.holding, state.held_nm = 1, size
+    elif power >= 0.0:
+        state.held_nm = max(state.held_nm, size)
+    elif size > params.hold_rise * state.held_nm:
+        state.holding, state.work_j = 0, 0.0
 
 
 @njit(cache=True)

@@ -1,5 +1,7 @@
 """N wiping tasks stepped together: what the single and the vector environment share."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from contactsafe.control import presets
@@ -10,6 +12,7 @@ from contactsafe.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 
 ACTION_SIZE = 18
@@ -22,6 +25,7 @@ class WipingTasks:
         config: of the task.
         n: how many.
         seed: of the sensors' noise; boards and starts are drawn from the generator given to `reset`.
+        worlds: one configuration for each task in place of `config.world`, such as obstacles of its own.
 
     Attributes:
         worlds: the simulation below.
@@ -29,10 +33,16 @@ class WipingTasks:
         step_limit: policy steps of an episode.
     """
 
-    def __init__(self, config: WipingConfig | None = None, n: int = 1, seed: int | None = None):
+    def __init__(
+        self,
+        config: WipingConfig | None = None,
+        n: int = 1,
+        seed: int | None = None,
+        worlds: Sequence[WorldConfig] | None = None,
+    ):
         self.config = config or WipingConfig()
         self.arm = robots.panda()
-        self.worlds = Worlds(self.arm, self.config.world, presets.by_name(self.config.controller), n, seed)
+        self.worlds = Worlds(self.arm, worlds or self.config.world, presets.by_name(self.config.controller), n, seed)
         self.tasks = np.zeros(n, dtype=task_dtype)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.config.world.board)
@@ -77,7 +87,14 @@ class WipingTasks:
         ink, distance = nearest_ink(worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"])
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
-        observe(plant, controller, worlds.cells[i], worlds.camera, task, worlds.masks[i])
+        self.observe(i)
+
+    def observe(self, i: int) -> None:
+        """Look again at world i, after its board was changed by hand."""
+        worlds = self.worlds
+        observe(
+            worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i]
+        )
 
     def posture_over(self, pose: Pose) -> np.ndarray:
         """Find joint positions for a tool pose, near those over the board's centre, (n,), rad."""

@@ -1,6 +1,7 @@
 """Simulated worlds: an arm under its controller before a whiteboard, one or many, stepped natively."""
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
@@ -10,6 +11,7 @@ from numba import njit
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype
+from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask
 from contactsafe.sim.config import WorldConfig
@@ -36,12 +38,29 @@ def run_worlds(start, stop, plants, controllers, cells, noise, ticks, reports, t
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
 
 
+def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list[WorldConfig]:
+    if world is None or isinstance(world, WorldConfig):
+        return [world or WorldConfig()] * n
+    configs = list(world)
+    if len(configs) != n:
+        raise InvalidInputError(f"{len(configs)} world configurations for {n} worlds; give one, or one each")
+    if any(c.board != configs[0].board or c.camera != configs[0].camera for c in configs):
+        raise InvalidInputError("worlds that step together must have the same board and camera; step the others apart")
+    return configs
+
+
+def _plants(arm: Arm, configs: list[WorldConfig]) -> list[mujoco.MjModel]:
+    """Compile a plant for each configuration, equal ones once."""
+    compiled: dict[WorldConfig, mujoco.MjModel] = {}
+    return [compiled.setdefault(c, build_plant(arm, c)) if c not in compiled else compiled[c] for c in configs]
+
+
 class Worlds:
-    """N independent worlds with one configuration, stepped in native threads.
+    """N independent worlds, stepped in native threads.
 
     Args:
         arm: built from facts, with a tool.
-        world: plant, sensors, board, camera, obstacles.
+        world: plant, sensors, board, camera, obstacles; one for all, or one for each (same board and camera).
         controller: a preset or another configuration, the same for all.
         n: how many.
         seed: of the sensors' noise and bias; world i draws from its own stream.
@@ -59,14 +78,16 @@ class Worlds:
     def __init__(
         self,
         arm: Arm,
-        world: WorldConfig | None = None,
+        world: WorldConfig | Sequence[WorldConfig] | None = None,
         controller: ControllerConfig | None = None,
         n: int = 1,
         seed: int | None = None,
     ):
-        self.arm, self.config, self.n = arm, world or WorldConfig(), n
-        self.model = build_plant(arm, self.config)
-        self.datas = [mujoco.MjData(self.model) for _ in range(n)]
+        self.arm, self.n = arm, n
+        self.configs = _one_each(world, n)
+        self.config = self.configs[0]
+        self.models = _plants(arm, self.configs)
+        self.datas = [mujoco.MjData(model) for model in self.models]
         self.boards = [Whiteboard(self.config.board) for _ in range(n)]
         self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
         self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
@@ -75,11 +96,11 @@ class Worlds:
         self._owners = [Controller(arm, controller, record) for record in self.controllers]
         for i in range(n):
             self.boards[i].cells = self.cells[i]
-            fill_plant(self.plants[i], self.model, self.datas[i], arm, self.config)
+            fill_plant(self.plants[i], self.models[i], self.datas[i], arm, self.configs[i])
             self.plants[i]["origin"] = self.boards[i].origin
         size = self.config.camera.size
         self.masks = np.full((n, size, size), 255, dtype=np.uint8)
-        self.camera = camera_tables(self.config.camera, self.boards[0], self.model)
+        self.camera = camera_tables(self.config.camera, self.boards[0], self.models[0])
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
@@ -94,7 +115,7 @@ class Worlds:
     def reset(self, i: int, q) -> None:
         """Put world i's arm at rest at q (n,) rad, with a new sensor bias; the board stays as it is."""
         q = self.arm.joint_vector(q, "q")
-        model, data, plant = self.model, self.datas[i], self.plants[i]
+        model, data, plant = self.models[i], self.datas[i], self.plants[i]
         mujoco.mj_resetData(model, data)
         data.qpos[: self.arm.n] = q
         self._owners[i].reset(q)
@@ -104,14 +125,14 @@ class Worlds:
         mujoco.mj_forward(model, data)
         plant["tick"], plant["push_body"] = 0, 0
         plant["tau_delayed"] = dynamics["g"]
-        sensors = self.config.sensors
+        sensors = self.configs[i].sensors
         plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
 
     def place(self, i: int, q) -> None:
         """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
         self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
-        mujoco.mj_kinematics(self.model, self.datas[i])
+        mujoco.mj_kinematics(self.models[i], self.datas[i])
 
     def close(self) -> None:
         """Stop the threads."""
@@ -172,8 +193,8 @@ class Worlds:
             ramp_s: time from nothing to full force, s.
         """
         plant = self.plants[i]
-        plant["push_body"] = self.model.body(body).id
+        plant["push_body"] = self.models[i].body(body).id
         plant["push_point"], plant["push_force"] = point, force
-        dt = self.model.opt.timestep
+        dt = self.models[i].opt.timestep
         plant["push_start"], plant["push_stop"] = round(start_s / dt), round(stop_s / dt)
         plant["push_ramp"] = max(1, round(ramp_s / dt))

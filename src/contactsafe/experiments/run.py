@@ -1,0 +1,74 @@
+"""Running tasks under a policy or a script, with every tick recorded."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contactsafe.envs.tasks import WipingTasks
+from contactsafe.experiments.results import Recording
+from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.world import MAX_TICKS
+
+Act = Callable[[dict[str, np.ndarray]], np.ndarray]
+"""From a batch of observations to actions, (n, 18)."""
+
+
+Progress = Callable[[int], object]
+"""Told how many trials were just done."""
+
+
+class Run:
+    """What N tasks did, tick by tick.
+
+    Attributes:
+        traces: one array of `trace_dtype` records for each task.
+        ended: policy step at which each task ended, (n,).
+        boards: the boards at every policy step that was kept, uint8 (F, n, rows, columns).
+        board_every: ticks between them.
+    """
+
+    def __init__(self, traces: list[np.ndarray], ended: np.ndarray, boards: np.ndarray, board_every: int):
+        self.traces, self.ended, self.boards, self.board_every = traces, ended, boards, board_every
+
+    def recording(self, i: int, scenario: str, controller: str, seed: int, obstacle=None) -> Recording:
+        """Give task i as a recording."""
+        return Recording(scenario, controller, seed, self.traces[i], self.boards[:, i], self.board_every, obstacle)
+
+
+def run_policy(tasks: WipingTasks, act: Act, steps: int, stop_when_clean: bool, board_every_steps: int = 12) -> Run:
+    """Run a policy in all tasks from where they stand.
+
+    Args:
+        tasks: reset.
+        act: the policy.
+        steps: policy steps.
+        stop_when_clean: end a task's trace when its board is clean or its arm met the table.
+        board_every_steps: policy steps between kept boards.
+    """
+    n = tasks.worlds.n
+    trace = np.zeros((n, MAX_TICKS), dtype=trace_dtype(tasks.arm.n))
+    pieces: list[list[np.ndarray]] = [[] for _ in range(n)]
+    ended = np.full(n, steps)
+    boards, ticks = [tasks.worlds.cells.copy()], 0
+    for step in range(steps):
+        tasks.step(act(tasks.observation()), trace)
+        ticks += int(tasks.worlds.reports["ticks"][0])
+        share = tasks.tasks["ink"] / np.maximum(tasks.tasks["ink_start"], 1)
+        for i in range(n):
+            if ended[i] == steps:
+                rows = trace[i, : tasks.worlds.reports["ticks"][i]].copy()
+                rows["ink_left"] = share[i]
+                pieces[i].append(rows)
+        if (step + 1) % board_every_steps == 0:
+            boards.append(tasks.worlds.cells.copy())
+        if stop_when_clean:
+            ended = np.where((ended == steps) & tasks.terminated, step + 1, ended)
+            if (ended <= step + 1).all():
+                break
+    board_every = round(board_every_steps * 1000 / 60)
+    return Run([np.concatenate(p) for p in pieces], ended, np.array(boards), board_every)
+
+
+def holding() -> Act:
+    """Give the policy that changes nothing."""
+    return lambda observation: np.zeros((len(observation["pose"]), 18))

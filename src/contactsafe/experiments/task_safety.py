@@ -1,0 +1,60 @@
+"""Task safety: the policy wipes held-out boards; how hard does the tool press, and does it wipe as well?"""
+
+import numpy as np
+
+from contactsafe.envs.config import WipingConfig
+from contactsafe.envs.tasks import WipingTasks
+from contactsafe.experiments.config import ExperimentConfig
+from contactsafe.experiments.results import Experiment, Recording, Trial
+from contactsafe.experiments.run import Progress, run_policy
+from contactsafe.learning.policy import Policy
+
+QUESTION = "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"
+SCENARIO = "wiping"
+_TOUCHING_N = 0.5  # pad force above which a tick counts as contact
+
+
+def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+    """Run the experiment.
+
+    Args:
+        bundle: loaded `Bundle`.
+        config: controllers and seeds.
+        progress: told of every trial done.
+    """
+    trials: list[Trial] = []
+    recordings: list[Recording] = []
+    for name in config.controllers:
+        for seeds in config.batches():
+            tasks = WipingTasks(WipingConfig(controller=name), len(seeds), seeds[0])
+            for i, seed in enumerate(seeds):
+                tasks.reset(i, np.random.default_rng(seed))
+            policy = Policy(bundle, tasks.worlds.homography)
+            run = run_policy(tasks, policy.act, tasks.step_limit, stop_when_clean=True)
+            for i, seed in enumerate(seeds):
+                trials.append(Trial(SCENARIO, name, seed, wiping_metrics(run.traces[i], bool(tasks.tasks["clean"][i]))))
+            if config.seed in seeds:
+                recordings.append(run.recording(0, SCENARIO, name, config.seed))
+            tasks.worlds.close()
+            if progress:
+                progress(len(seeds))
+    return Experiment("task-safety", QUESTION, tuple(trials), tuple(recordings))
+
+
+def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
+    """Summarise one episode of wiping.
+
+    Args:
+        trace: `trace_dtype` records, (T,).
+        clean: whether the board ended clean.
+    """
+    force = np.linalg.norm(trace["tool_force"], axis=1)
+    touching = force > _TOUCHING_N
+    return {
+        "ink_removed": float(1.0 - trace["ink_left"][-1]),
+        "time_s": float(trace["time"][-1]) if clean else float("nan"),
+        "tool_force_peak_n": float(force.max()),
+        "tool_force_median_n": float(np.median(force[touching])) if touching.any() else float("nan"),
+        "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
+        "contact_mode_share": float(trace["mode"].mean()),
+    }
