@@ -1,0 +1,100 @@
+"""Where an arm's capsules and pad are: forward kinematics from the facts alone, many postures at once, without MuJoCo."""
+
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.rotation import quat_to_matrix
+
+
+def link_frames(facts: ArmFacts, q) -> tuple[np.ndarray, np.ndarray]:
+    """Give the frames of base, links and tool mount in world axes, base at the origin.
+
+    Args:
+        facts: the arm, of n joints.
+        q: joint positions, (F, n), rad.
+
+    Returns:
+        Origins, (F, n + 2, 3), m, and rotations, (F, n + 2, 3, 3): base, links 1 to n, tool mount.
+
+    Raises:
+        InvalidInputError: q has another shape.
+    """
+    n = len(facts.links)
+    q = np.asarray(q, dtype=float)
+    if q.ndim != 2 or q.shape[1] != n:
+        raise InvalidInputError(f"q has shape {q.shape}; give F × {n} joint positions, one row a posture")
+    origins = np.zeros((len(q), n + 2, 3))
+    rotations = np.zeros((len(q), n + 2, 3, 3))
+    rotations[:, 0] = np.eye(3)
+    for i, link in enumerate(facts.links, start=1):
+        turn = _about_z(q[:, i - 1])
+        _attach(origins, rotations, i, link.position, link.quat)
+        rotations[:, i] = rotations[:, i] @ turn
+    _attach(origins, rotations, n + 1, facts.mount_position, facts.mount_quat)
+    return origins, rotations
+
+
+def arm_capsules(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Place all capsules of an arm and its tool in the world.
+
+    Args:
+        facts: the arm, of n joints.
+        tool: what the flange carries.
+        q: joint positions, (F, n), rad.
+
+    Returns:
+        Centres of the round ends, starts and ends, (F, K, 3), m; radii, (K,), m; and what each belongs to, (K,):
+        0 the base, 1 to n a link, n + 1 the tool.
+
+    Raises:
+        InvalidInputError: q has another shape.
+    """
+    origins, rotations = link_frames(facts, q)
+    groups = (facts.base_capsules, *(link.capsules for link in facts.links), tool.capsules)
+    owned = [(owner, capsule) for owner, capsules in enumerate(groups) for capsule in capsules]
+    links = np.array([owner for owner, _ in owned])
+    radii = np.array([capsule.radius for _, capsule in owned])
+    local = np.array([(capsule.start, capsule.end) for _, capsule in owned])  # (K, 2, 3)
+    placed = np.einsum("fkij,kej->fkei", rotations[:, links], local) + origins[:, links, None]
+    return placed[:, :, 0], placed[:, :, 1], radii, links
+
+
+def pad_box(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place the tool's pad in the world.
+
+    Args:
+        facts: the arm, of n joints.
+        tool: what the flange carries, with a pad.
+        q: joint positions, (F, n), rad.
+
+    Returns:
+        Centre, (F, 3), m; half edges, (3,), m; rotation, (F, 3, 3).
+
+    Raises:
+        InvalidInputError: the tool has no pad, or q has another shape.
+    """
+    if tool.pad_half_size is None:
+        raise InvalidInputError(
+            f"tool '{tool.name}' has no pad; give one with pad_half_size, such as robots.WIPING_PAD"
+        )
+    origins, rotations = link_frames(facts, q)
+    half = np.array(tool.pad_half_size)
+    centre = np.array(tool.tcp) - (0.0, 0.0, half[2])
+    return origins[:, -1] + rotations[:, -1] @ centre, half, rotations[:, -1]
+
+
+def _attach(origins: np.ndarray, rotations: np.ndarray, index: int, position, quat) -> None:
+    """Fill frame `index` as fixed to the one before it."""
+    origins[:, index] = origins[:, index - 1] + rotations[:, index - 1] @ np.array(position)
+    rotations[:, index] = rotations[:, index - 1] @ quat_to_matrix(np.array(quat))
+
+
+def _about_z(angle: np.ndarray) -> np.ndarray:
+    """Rotation matrices about z, (F, 3, 3), of angles (F,), rad."""
+    turn = np.zeros((len(angle), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    return turn
