@@ -8,7 +8,7 @@ import numpy as np
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.presets import safe
 from contactsafe.control.records import CONTACT, FAULTS, controller_dtype, fill_params
-from contactsafe.control.tick import control_tick
+from contactsafe.control.tick import tick_at
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.ik import InverseKinematics
@@ -87,13 +87,16 @@ class Controller:
     Args:
         arm: `contactsafe.robots.panda()` or another.
         config: a preset such as `contactsafe.presets.safe()`, the default.
-        record: a `controller_dtype` record to live in, such as one of an array of many; its own where None.
+        records: `controller_dtype` records to live in, such as those of many controllers; its own where None.
+        index: which of them.
 
     Attributes:
         record: everything the controller is made of; copy its `state` to save it.
     """
 
-    def __init__(self, arm: Arm, config: ControllerConfig | None = None, record: np.void | None = None):
+    def __init__(
+        self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
+    ):
         if not isinstance(arm, Arm):
             raise InvalidInputError(f"arm is {type(arm).__name__}; give an Arm such as contactsafe.robots.panda()")
         config = safe() if config is None else config
@@ -105,7 +108,11 @@ class Controller:
         self.config = config
         self._nominal = arm.nominal()
         self._ik = InverseKinematics(arm)
-        self.record = np.zeros(1, dtype=controller_dtype(arm.n))[0] if record is None else record
+        self._records = np.zeros(1, dtype=controller_dtype(arm.n)) if records is None else records
+        self._index = index
+        self.record = self._records[index]
+        self._measured = _views(self._records["measurement"], index)
+        self._reported = _views(self._records["output"], index)
         self.record["handle"] = self._nominal.handle
         fill_params(self.record["params"], config, arm)
         self._last_target: Target | None = None
@@ -152,7 +159,7 @@ class Controller:
             self.set_target(target)
             self._last_target = target
         self._set_measurement(measurement)
-        control_tick(self.record)
+        tick_at(self._records, self._index)
         return self._output()
 
     def set_target(self, target: Target) -> None:
@@ -183,20 +190,20 @@ class Controller:
         return gain
 
     def _set_measurement(self, measurement: Measurement) -> None:
-        record = self.record["measurement"]
-        record["q"] = _shaped(measurement.q, self.arm.n, "q")
-        record["qd"] = _shaped(measurement.qd, self.arm.n, "qd")
-        record["has_wrench"] = measurement.wrench_ee is not None
+        seen = self._measured
+        seen["q"][:] = _shaped(measurement.q, self.arm.n, "q")
+        seen["qd"][:] = _shaped(measurement.qd, self.arm.n, "qd")
+        seen["has_wrench"][...] = measurement.wrench_ee is not None
         if measurement.wrench_ee is not None:
-            record["wrench_ee"] = _shaped(measurement.wrench_ee, 6, "wrench_ee")
+            seen["wrench_ee"][:] = _shaped(measurement.wrench_ee, 6, "wrench_ee")
 
     def _output(self) -> Output:
-        out, state = self.record["output"], self.record["state"]
+        out = self._reported
         contact = Contact(
             in_contact=bool(out["mode"] == CONTACT),
             link=int(out["link"]),
             holding=bool(out["holding"]),
-            torque=state["residual_trigger"].copy(),
+            torque=out["residual_trigger"].copy(),
         )
         return Output(
             torque=out["torque"].copy(),
@@ -206,6 +213,11 @@ class Controller:
             limited=bool(out["limited"]),
             fault=FAULTS[int(out["fault"])],
         )
+
+
+def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
+    """Give each field of one record as an array that shares its memory: reading and writing it is quick."""
+    return {name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names}
 
 
 def _shaped(value, n: int, name: str) -> np.ndarray:

@@ -48,6 +48,12 @@ def control_tick(c):
     _finish(c, tau)
 
 
+@njit(cache=True, nogil=True)
+def tick_at(controllers, i):
+    """Run `control_tick` on one of an array of records: from Python an array is handed over far faster than a record."""
+    control_tick(controllers[i])
+
+
 @njit(cache=True)
 def _all_finite(x):
     for i in range(x.shape[0]):

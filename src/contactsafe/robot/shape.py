@@ -1,4 +1,4 @@
-"""Where an arm's capsules and pad are: forward kinematics from the facts alone, many postures at once, without MuJoCo."""
+"""Where an arm's capsules and pad are: kinematics from the facts alone, many postures at once, no MuJoCo."""
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def pad_box(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.
     """
     if tool.pad_half_size is None:
         raise InvalidInputError(
-            f"tool '{tool.name}' has no pad; give one with pad_half_size, such as robots.WIPING_PAD"
+            f"tool '{tool.name}' has no pad; give one that has, such as robots.WIPING_PAD"
         )
     origins, rotations = link_frames(facts, q)
     half = np.array(tool.pad_half_size)

@@ -93,7 +93,7 @@ class Worlds:
         self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
         self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
         self.reports = np.zeros(n, dtype=report_dtype)
-        self._owners = [Controller(arm, controller, record) for record in self.controllers]
+        self._owners = [Controller(arm, controller, self.controllers, i) for i in range(n)]
         for i in range(n):
             self.boards[i].cells = self.cells[i]
             fill_plant(self.plants[i], self.models[i], self.datas[i], arm, self.configs[i])

@@ -1,0 +1,287 @@
+"""The command line: the one place that composes everything."""
+
+import importlib.util
+import inspect
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+import contactsafe
+from contactsafe.control import presets
+from contactsafe.errors import ContactSafeError, InvalidInputError
+from contactsafe.experiments.config import ExperimentConfig
+from contactsafe.experiments.results import Experiment, to_json
+from contactsafe.learning.bundle import Bundle, shipped_bundle
+
+Controllers = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
+
+
+def _experiments() -> dict[str, Callable]:
+    from contactsafe.experiments.disturbance import disturbance
+    from contactsafe.experiments.joint_safety import joint_safety
+    from contactsafe.experiments.task_safety import task_safety
+
+    return {"task-safety": task_safety, "joint-safety": joint_safety, "disturbance": disturbance}
+
+
+_SCENARIOS = {"task-safety": 1, "joint-safety": 2, "disturbance": 6}
+
+
+def demo(
+    out: Path = Path("contactsafe-demo"),
+    trials: int = 10,
+    seed: int = 0,
+    controllers: Controllers = "vices,paper,safe",
+    bundle: Path | None = None,
+) -> None:
+    """Run the shipped policy through the paper's three experiments and write a page about it.
+
+    Args:
+        out: folder for report.html and summary.json.
+        trials: seeds tried with each controller.
+        seed: first seed.
+        controllers: presets to compare.
+        bundle: folder of another policy.
+    """
+    from contactsafe.report import prepare_output, terminal_table, write_report
+
+    config = _config(controllers, trials, seed)
+    loaded = Bundle.load(bundle or shipped_bundle())
+    folder = prepare_output(out)
+    started = time.monotonic()
+    names = list(_SCENARIOS)
+    print("contactsafe demo: compiling on the first run takes about a minute", file=sys.stderr)
+    results = _run(names, loaded, config)
+    facts = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
+    page = write_report(folder, results, facts)
+    print(terminal_table(results))
+    print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
+
+
+def experiment(
+    name: Annotated[str, tyro.conf.Positional],
+    controllers: Controllers = "vices,paper,safe",
+    trials: int = 10,
+    seed: int = 0,
+    out: Path | None = None,
+    json: bool = False,
+    bundle: Path | None = None,
+) -> None:
+    """Run one experiment: task-safety, joint-safety or disturbance.
+
+    Args:
+        name: task-safety, joint-safety or disturbance.
+        controllers: presets to compare.
+        trials: seeds tried with each controller.
+        seed: first seed.
+        out: folder for report.html and summary.json; none is written without it.
+        json: print spreads and trials as JSON instead of a table.
+        bundle: folder of another policy.
+    """
+    from contactsafe.report import prepare_output, terminal_table, write_report
+    from contactsafe.report.summary import summarise
+
+    if name not in _SCENARIOS:
+        raise InvalidInputError(f"experiment '{name}' is unknown; choose from {', '.join(_SCENARIOS)}")
+    config = _config(controllers, trials, seed)
+    loaded = Bundle.load(bundle or shipped_bundle())
+    folder = prepare_output(out) if out else None
+    started = time.monotonic()
+    results = _run([name], loaded, config)
+    facts = _facts(f"contactsafe experiment {name}", config, loaded, time.monotonic() - started)
+    page = write_report(folder, results, facts) if folder else None
+    print(to_json(summarise(results, facts)) if json else terminal_table(results))
+    if page:
+        print(f"report: {page}", file=sys.stderr)
+
+
+def evaluate(
+    bundle: Annotated[Path | None, tyro.conf.Positional] = None,
+    episodes: int = 50,
+    seed: int = 0,
+    controller: str = "safe",
+    json: bool = False,
+) -> None:
+    """Let a policy wipe boards it has never seen and report success, forces and times.
+
+    Args:
+        bundle: folder of the policy; the shipped one if none is named.
+        episodes: boards to wipe.
+        seed: of boards, starts and noise.
+        controller: preset underneath.
+        json: print JSON instead of a table.
+    """
+    import gymnasium
+
+    from contactsafe.envs.config import WipingConfig
+    from contactsafe.learning.evaluation import evaluate_policy
+    from contactsafe.learning.policy import Policy
+
+    presets.by_name(controller)
+    if episodes < 1:
+        raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
+    if seed < 0:
+        raise InvalidInputError(f"seed = {seed}; give 0 or more")
+    loaded = Bundle.load(bundle or shipped_bundle())
+    env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=min(16, episodes), config=WipingConfig(controller=controller))
+    policy = Policy(loaded, env.unwrapped.camera_homography)
+    with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
+        results = evaluate_policy(policy, env, episodes, seed, on_episode=lambda record: bar.update())
+    env.close()
+    records = results.pop("records")
+    if json:
+        print(to_json({**results, "seed": seed, "controller": controller, "boards": records}))
+        return
+    for key, value in results.items():
+        print(f"{key:28s} {value:.4g}" if isinstance(value, float) else f"{key:28s} {value}")
+
+
+def bench(json: bool = False, bundle: Path | None = None) -> None:
+    """Time the parts on this machine, each as a median and as a ratio to bare physics.
+
+    Args:
+        json: print JSON instead of a table.
+        bundle: folder of another policy.
+    """
+    from contactsafe.experiments.speed import ROUNDS, measure_speed
+
+    loaded = Bundle.load(bundle or shipped_bundle())
+    with tqdm(total=ROUNDS, desc="rounds", file=sys.stderr) as bar:
+        speeds = measure_speed(loaded, bar.update)
+    if json:
+        print(to_json([asdict(speed) for speed in speeds]))
+        return
+    print(f"{'':44s}{'median':>12s}{'fastest':>12s}{'ratio':>9s}")
+    for speed in speeds:
+        print(f"{speed.name:44s}{speed.median_us:9.1f} µs{speed.best_us:9.1f} µs{speed.ratio:9.2f}")
+    per_step = next(speed for speed in speeds if speed.name.startswith("environment"))
+    print(f"environment steps per second: {1e6 / per_step.median_us:.0f}")
+
+
+def train(arguments: Sequence[str]) -> None:
+    """Train the eyes (vae) or the policy (ppo); `contactsafe train vae --help` and `contactsafe train ppo --help`."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(
+            "usage: contactsafe train vae|ppo [options]\n\n"
+            "  vae  the β-VAE on masks from the simulator; writes runs/vae\n"
+            "  ppo  the policy on [pose, latent]; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n\n"
+            "Both show a progress bar, log to TensorBoard, and go on with --resume where they were stopped."
+        )
+        return
+    if arguments[0] not in ("vae", "ppo"):
+        raise InvalidInputError(f"'contactsafe train {arguments[0]}' is unknown; choose vae or ppo")
+    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InvalidInputError(f"training needs {', '.join(missing)}; run: pip install 'contactsafe[train]'")
+    {"vae": _train_vae, "ppo": _train_ppo}[arguments[0]](list(arguments[1:]))
+
+
+def _train_vae(arguments: list[str]) -> None:
+    from contactsafe.envs.sampling import MaskSampler
+    from contactsafe.learning.train_vae import VaeConfig, train_vae
+
+    config = tyro.cli(VaeConfig, prog="contactsafe train vae", args=arguments)
+    sampler = MaskSampler()
+    report = train_vae(config, sampler.sample, sampler.homography)
+    print(to_json({"reconstruction": report["reconstruction"], "nearest_ink": report["nearest_ink"]}))
+    print(f"encoder: {config.out}; next: contactsafe train ppo --vae {config.out}")
+
+
+def _train_ppo(arguments: list[str]) -> None:
+    import gymnasium
+
+    from contactsafe.envs.config import WipingConfig
+    from contactsafe.learning.train_ppo import PpoConfig, train_ppo
+
+    config = tyro.cli(PpoConfig, prog="contactsafe train ppo", args=arguments)
+    free_space = WipingConfig(controller="vices")
+
+    def make_env(n: int):
+        return gymnasium.make_vec(config.env_id, num_envs=n, config=free_space)
+
+    print(to_json(train_ppo(config, make_env)))
+    print(f"policy: {config.out / 'bundle'}; next: contactsafe evaluate {config.out / 'bundle'}")
+
+
+@dataclass(frozen=True)
+class _Command:
+    run: Callable
+    parses: bool = True
+
+
+COMMANDS = {
+    "demo": _Command(demo),
+    "train": _Command(train, parses=False),
+    "evaluate": _Command(evaluate),
+    "experiment": _Command(experiment),
+    "bench": _Command(bench),
+}
+
+
+def _config(controllers: str, trials: int, seed: int) -> ExperimentConfig:
+    names = tuple(name.strip() for name in controllers.split(",") if name.strip())
+    return ExperimentConfig(names, trials, seed)
+
+
+def _run(names: Sequence[str], bundle: Bundle, config: ExperimentConfig) -> list[Experiment]:
+    experiments = _experiments()
+    results = []
+    total = config.trials * len(config.controllers) * sum(_SCENARIOS[name] for name in names)
+    with tqdm(total=total, unit="trial", file=sys.stderr) as bar:
+        for name in names:
+            bar.set_description(name)
+            results.append(experiments[name](bundle, config, bar.update))
+    return results
+
+
+def _facts(command: str, config: ExperimentConfig, bundle: Bundle, seconds: float) -> dict:
+    return {
+        "command": f"{command} --trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}",
+        "seeds": list(range(config.seed, config.seed + config.trials)),
+        "policy": bundle.manifest["files"],
+        "seconds": round(seconds, 1),
+    }
+
+
+def _help() -> str:
+    lines = ["usage: contactsafe COMMAND [options]", ""]
+    for name, command in COMMANDS.items():
+        lines.append(f"  {name:12s}{(inspect.getdoc(command.run) or '').splitlines()[0]}")
+    return "\n".join([*lines, "", "`contactsafe COMMAND --help` says more; `contactsafe --version` gives the version."])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; exit status 0 only when it did its job.
+
+    Args:
+        arguments: words after `contactsafe`; those of the process where None.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help"):
+        print(_help())
+        return 0 if words else 2
+    if words[0] == "--version":
+        print(f"contactsafe {contactsafe.__version__}")
+        return 0
+    if words[0] not in COMMANDS:
+        print(f"contactsafe: command '{words[0]}' is unknown; choose from {', '.join(COMMANDS)}", file=sys.stderr)
+        return 2
+    command = COMMANDS[words[0]]
+    try:
+        if command.parses:
+            tyro.cli(command.run, prog=f"contactsafe {words[0]}", args=words[1:])
+        else:
+            command.run(words[1:])
+    except ContactSafeError as error:
+        print(f"contactsafe: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("contactsafe: stopped", file=sys.stderr)
+        return 130
+    return 0

@@ -1,0 +1,8 @@
+"""Data in, pages out: the table for the terminal, `summary.json` and the self-contained `report.html` of experiments."""
+
+from contactsafe.report.output import prepare_output
+from contactsafe.report.page import write_report
+from contactsafe.report.summary import write_summary
+from contactsafe.report.table import terminal_table
+
+__all__ = ["prepare_output", "terminal_table", "write_report", "write_summary"]

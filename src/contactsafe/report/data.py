@@ -1,0 +1,136 @@
+"""What this room reads: experiments as it sees them, and small questions to ask of them."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol, TypedDict
+
+import numpy as np
+
+BASELINE = "vices"
+"""The controller that the others are compared with."""
+
+MISSING = "–"
+
+_KNOWN = ("vices", "paper", "safe")
+
+
+class Spread(Protocol):
+    """A figure over seeds; NaN where no trial has it."""
+
+    @property
+    def median(self) -> float: ...  # noqa: D102
+    @property
+    def p5(self) -> float: ...  # noqa: D102
+    @property
+    def p95(self) -> float: ...  # noqa: D102
+    @property
+    def min(self) -> float: ...  # noqa: D102
+    @property
+    def max(self) -> float: ...  # noqa: D102
+    @property
+    def n(self) -> int: ...  # noqa: D102
+
+
+class Recording(Protocol):
+    """One trial in time; `contactsafe.experiments.results.Recording` is one."""
+
+    @property
+    def scenario(self) -> str: ...  # noqa: D102
+    @property
+    def controller(self) -> str: ...  # noqa: D102
+    @property
+    def seed(self) -> int: ...  # noqa: D102
+    @property
+    def trace(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def boards(self) -> np.ndarray: ...  # noqa: D102
+    @property
+    def board_every(self) -> int: ...  # noqa: D102
+    @property
+    def obstacle(self) -> tuple[float, float] | None: ...  # noqa: D102
+
+
+class Experiment(Protocol):
+    """What one experiment measured; `contactsafe.experiments.results.Experiment` is one."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def question(self) -> str: ...  # noqa: D102
+    @property
+    def recordings(self) -> Sequence[Recording]: ...  # noqa: D102
+
+    def spreads(self) -> Mapping[str, Mapping[str, Mapping[str, Spread]]]:
+        """Scenario → controller → metric → spread over seeds."""
+        ...
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        ...
+
+
+class RunFacts(TypedDict, total=False):
+    """What is known of the run beside its figures; every entry may be left out, others are passed on to the summary.
+
+    Attributes:
+        version: of contactsafe.
+        when: ISO 8601 date and time.
+        seeds: tried by each controller.
+        bundle_sha256: digest of the policy bundle.
+        command: as typed.
+        push_s: start and end of the pushes of the disturbance experiment, s.
+    """
+
+    version: str
+    when: str
+    seeds: Sequence[int]
+    bundle_sha256: str
+    command: str
+    push_s: tuple[float, float]
+
+
+def find(experiments: Iterable[Experiment], name: str) -> Experiment | None:
+    """Give the experiment of that name."""
+    return next((experiment for experiment in experiments if experiment.name == name), None)
+
+
+def controllers(experiments: Iterable[Experiment]) -> list[str]:
+    """Name all controllers measured: the known ones first, baseline leading, then others as they come."""
+    found = dict.fromkeys(name for e in experiments for rows in e.spreads().values() for name in rows)
+    return [name for name in _KNOWN if name in found] + [name for name in found if name not in _KNOWN]
+
+
+def recorded(experiment: Experiment, scenario: str) -> list[Recording]:
+    """Give one recording a controller of a scenario, in the order of `controllers`."""
+    first: dict[str, Recording] = {}
+    for recording in experiment.recordings:
+        if recording.scenario == scenario and len(recording.trace):
+            first.setdefault(recording.controller, recording)
+    return [first[name] for name in controllers([experiment]) if name in first]
+
+
+def scenarios(experiment: Experiment) -> list[str]:
+    """Name the scenarios that were recorded, in order."""
+    return list(dict.fromkeys(recording.scenario for recording in experiment.recordings))
+
+
+def seconds(recording: Recording) -> np.ndarray:
+    """Give the time of every tick since the recording's start, (T,), s."""
+    time = recording.trace["time"]
+    return time - time[0]
+
+
+def ratio(value: Spread | None, baseline: Spread | None) -> float:
+    """Divide two medians; NaN where one does not exist or the baseline is zero."""
+    if value is None or baseline is None or not baseline.median:
+        return math.nan
+    return value.median / baseline.median
+
+
+def number(value: float) -> str:
+    """Write a figure with about three digits; an en dash where there is none."""
+    if not math.isfinite(value):
+        return MISSING
+    size = abs(value)
+    text = f"{value:.{0 if size >= 100 else 1 if size >= 10 else 2}f}"
+    return text.replace("-", "−")

@@ -1,0 +1,200 @@
+"""Which figures are shown, what they are called, and what is aimed at."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from contactsafe.report.data import BASELINE, Experiment, Spread, number, ratio
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a figure should be; judged on its median, or on its largest value where `worst`.
+
+    Attributes:
+        below: largest value allowed, in the row's unit.
+        above: smallest value allowed, in the row's unit.
+        share: largest multiple of the baseline's median allowed.
+        at_least_share: smallest multiple of the baseline's median allowed.
+        where_baseline_above: the aim holds only where the baseline's median is greater, in the row's unit.
+        worst: judge the largest value over seeds.
+        scenarios: words of which one must stand in the scenario's name; empty for all.
+    """
+
+    below: float | None = None
+    above: float | None = None
+    share: float | None = None
+    at_least_share: float | None = None
+    where_baseline_above: float | None = None
+    worst: bool = False
+    scenarios: tuple[str, ...] = ()
+
+    def text(self, unit: str) -> str:
+        """Say it in a few words."""
+        parts = []
+        if self.above is not None and self.below is not None:
+            parts.append(f"{self.above:g} to {self.below:g} {unit}")
+        elif self.below is not None:
+            parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
+        if self.share is not None:
+            parts.append(f"≤ {_fraction(self.share)} of {BASELINE}")
+        if self.at_least_share is not None:
+            parts.append(f"≥ {_fraction(self.at_least_share)} of {BASELINE}")
+        if self.where_baseline_above is not None:
+            parts.append(f"where {BASELINE} passes {self.where_baseline_above:g}")
+        return " ".join(parts)
+
+    def judge(self, value: Spread | None, baseline: Spread | None, scale: float) -> bool | None:
+        """Tell whether a figure reaches the aim; None where that cannot be said."""
+        if value is None or value.n == 0:
+            return None
+        limit = self.where_baseline_above
+        if limit is not None and (baseline is None or not scale * baseline.median > limit):
+            return None
+        found = scale * (value.max if self.worst else value.median)
+        of_baseline = ratio(value, baseline)
+        if (self.share is not None or self.at_least_share is not None) and of_baseline != of_baseline:
+            return None
+        return (
+            (self.below is None or found <= self.below)
+            and (self.above is None or found >= self.above)
+            and (self.share is None or of_baseline <= self.share)
+            and (self.at_least_share is None or of_baseline >= self.at_least_share)
+        )
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure as it is shown.
+
+    Attributes:
+        metric: its name in the trials.
+        label: its name for readers.
+        unit: as shown.
+        scale: from the trials' unit to the one shown.
+        main: also shown in the summary and in the terminal.
+        aim: what it should be.
+    """
+
+    metric: str
+    label: str
+    unit: str
+    scale: float = 1.0
+    main: bool = False
+    aim: Aim | None = None
+
+    def aim_in(self, scenario: str) -> Aim | None:
+        """Give the aim, where it applies to this scenario."""
+        if self.aim is None or (self.aim.scenarios and not any(word in scenario for word in self.aim.scenarios)):
+            return None
+        return self.aim
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row filled in for one scenario: spreads by controller."""
+
+    scenario: str
+    row: Row
+    values: Mapping[str, Spread]
+
+    @property
+    def baseline(self) -> Spread | None:
+        """The baseline's figure."""
+        return self.values.get(BASELINE)
+
+    def verdict(self, controller: str) -> bool | None:
+        """Tell whether a controller reaches the aim; None where there is none, or nothing to judge."""
+        aim = self.row.aim_in(self.scenario)
+        return None if aim is None else aim.judge(self.values.get(controller), self.baseline, self.row.scale)
+
+
+TITLES = {"task-safety": "Task safety", "joint-safety": "Joint safety", "disturbance": "Disturbance"}
+
+_PUSHED = Aim(below=10.0, where_baseline_above=25.0, scenarios=("link 4", "link 5"))
+
+CATALOGUE: dict[str, tuple[Row, ...]] = {
+    "task-safety": (
+        Row("ink_removed", "ink removed", "%", 100.0, main=True, aim=Aim(at_least_share=0.95)),
+        Row("time_s", "time to a clean board", "s"),
+        Row("tool_force_peak_n", "tool force, peak", "N", main=True, aim=Aim(below=40.0, worst=True)),
+        Row("tool_force_median_n", "tool force, median in contact", "N", main=True, aim=Aim(below=10.0, above=2.0)),
+        Row("tool_force_p95_n", "tool force, 95th percentile in contact", "N"),
+    ),
+    "joint-safety": (
+        Row("contact_steady_n", "contact force, steady", "N", main=True, aim=Aim(share=1 / 3)),
+        Row("contact_peak_n", "contact force, peak", "N", main=True, aim=Aim(share=1 / 2)),
+        Row("impulse_ns", "impulse of the contact", "N s"),
+        Row(
+            "tau_steady_nm", "external joint torque, steady", "N m", main=True,
+            aim=Aim(below=5.0, where_baseline_above=8.0),
+        ),
+        Row("tau_peak_nm", "external joint torque, peak", "N m"),
+        Row("residual_steady_nm", "observer's residual, steady", "N m"),
+        Row("residual_peak_nm", "observer's residual, peak", "N m"),
+        Row("detect_ms", "contact to its detection", "ms"),
+        Row("met", "runs that met the obstacle", "%", 100.0),
+    ),
+    "disturbance": (
+        Row("error_max_mm", "tool error, largest axis", "mm", main=True, aim=_PUSHED),
+        Row("error_x_mm", "tool error, x", "mm"),
+        Row("error_y_mm", "tool error, y", "mm"),
+        Row("error_z_mm", "tool error, z", "mm"),
+        Row("error_end_mm", "tool error at the end of the push", "mm"),
+        Row("error_after_mm", "tool error after the push", "mm"),
+    ),
+}  # fmt: skip
+"""Rows of the known experiments. Metrics not named here are in `summary.json` only."""
+
+_UNITS = {"n": "N", "nm": "N m", "ns": "N s", "mm": "mm", "ms": "ms", "s": "s"}
+
+
+def lines(experiment: Experiment, main_only: bool = False) -> list[Line]:
+    """Fill in all rows of an experiment for which there is a figure, scenario by scenario.
+
+    Args:
+        experiment: one of `CATALOGUE`, or any other, all of whose metrics are then shown.
+        main_only: leave out what is only of interest beside the other figures.
+    """
+    out = []
+    for scenario, by_controller in experiment.spreads().items():
+        rows = CATALOGUE.get(experiment.name) or _rows_of_unknown(by_controller)
+        for row in rows:
+            values = {name: metrics[row.metric] for name, metrics in by_controller.items() if row.metric in metrics}
+            if values and (row.main or not main_only):
+                out.append(Line(scenario, row, values))
+    return out
+
+
+def _rows_of_unknown(by_controller: Mapping[str, Mapping[str, Spread]]) -> list[Row]:
+    names = dict.fromkeys(name for metrics in by_controller.values() for name in metrics)
+    rows = []
+    for name in names:
+        stem, _, unit = name.rpartition("_")
+        known = unit in _UNITS and bool(stem)
+        rows.append(Row(name, (stem if known else name).replace("_", " "), _UNITS[unit] if known else "", main=True))
+    return rows
+
+
+def shortfalls(experiment: Experiment, names: Sequence[str]) -> list[str]:
+    """Say in sentences where controllers other than the baseline miss an aim, with the figures."""
+    out = []
+    for line in lines(experiment):
+        aim = line.row.aim_in(line.scenario)
+        for name in names:
+            if aim is None or name == BASELINE or line.verdict(name) is not False:
+                continue
+            value, unit = line.values[name], line.row.unit
+            found = line.row.scale * (value.max if aim.worst else value.median)
+            sentence = f"{name}, {line.scenario}: {line.row.label} is {number(found)} {unit}"
+            share = ratio(value, line.baseline)
+            if line.baseline is not None and share == share:
+                sentence += f", {number(share)} of the {number(line.row.scale * line.baseline.median)} {unit} of {BASELINE}"
+            out.append(f"{sentence}; the aim is {aim.text(unit)}.")
+    return out
+
+
+def _fraction(value: float) -> str:
+    for below in range(1, 10):
+        if abs(value * below - round(value * below)) < 1e-9:
+            return f"{round(value * below)}/{below}" if below > 1 else f"{round(value)}"
+    return f"{value:g}"

@@ -1,0 +1,187 @@
+"""The simulated scene as a picture: a camera at infinity, so that capsules stay capsules and the board stays affine."""
+
+import base64
+import io
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactsafe.report.data import Recording
+from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.shape import arm_capsules, pad_box
+from contactsafe.sim.config import BoardConfig
+
+INK, OBJECT = 1, 2
+"""What a board's cell may hold besides nothing."""
+
+INK_RGB, OBJECT_RGB = (24, 48, 104), (20, 20, 22)
+
+_AZIMUTH, _ELEVATION = math.radians(-28.0), math.radians(24.0)
+_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is filmed: an arm with its tool, over a board.
+
+    Attributes:
+        arm: its facts.
+        tool: what it carries.
+        board: the whiteboard.
+    """
+
+    arm: ArmFacts
+    tool: Tool
+    board: BoardConfig
+
+    def board_corners(self) -> np.ndarray:
+        """Corners of the board in the order of the outline, world, (4, 3), m."""
+        x, y, z = self.board.centre
+        dx, dy = self.board.size[0] / 2, self.board.size[1] / 2
+        return np.array([(x - dx, y - dy, z), (x + dx, y - dy, z), (x + dx, y + dy, z), (x - dx, y + dy, z)])
+
+
+@dataclass(frozen=True)
+class View:
+    """Where it is seen from.
+
+    Attributes:
+        target: world point in the middle of the picture, m.
+        span: width and height that the picture must show, m.
+        azimuth: of the camera about z, rad; 0 looks at the robot's face.
+        elevation: of the camera above the table, rad.
+    """
+
+    target: tuple[float, float, float]
+    span: tuple[float, float]
+    azimuth: float = _AZIMUTH
+    elevation: float = _ELEVATION
+
+    def axes(self) -> np.ndarray:
+        """Rows: right, up, towards the camera; world, (3, 3)."""
+        ca, sa, ce, se = (f(x) for x in (self.azimuth, self.elevation) for f in (math.cos, math.sin))
+        return np.array([(-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)])
+
+    def scale(self, width: float, height: float) -> float:
+        """Pixels a metre in a picture of that size."""
+        return min(width / self.span[0], height / self.span[1])
+
+    def project(self, points, width: float, height: float) -> np.ndarray:
+        """Give pixel x, pixel y (down) and nearness, m, of world points (…, 3)."""
+        relative = (np.asarray(points) - self.target) @ self.axes().T
+        scale = self.scale(width, height)
+        relative[..., 0] = width / 2 + scale * relative[..., 0]
+        relative[..., 1] = height / 2 - scale * relative[..., 1]
+        return relative
+
+
+def fit(subject: Subject, recordings: list[Recording]) -> View:
+    """Choose the view in which the arm of all recordings, the board and the obstacle are seen."""
+    points = [subject.board_corners()]
+    for recording in recordings:
+        q = recording.trace["q"][:: max(1, len(recording.trace) // 60)]
+        starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
+        middle = np.concatenate([starts, ends], axis=1).reshape(-1, 3)
+        points += [middle + radii.max(), middle - radii.max()]
+        if recording.obstacle is not None:
+            centre = recording.trace["obstacle_position"][:, 0]
+            reach = max(recording.obstacle)
+            points += [centre.max(axis=0)[None] + reach, centre.min(axis=0)[None] - reach]
+    cloud = np.concatenate(points)
+    view = View(tuple(((cloud.min(axis=0) + cloud.max(axis=0)) / 2).tolist()), (1.0, 1.0))
+    seen = (cloud - view.target) @ view.axes().T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle = view.axes()[:2].T @ ((low + high)[:2] / 2)  # recentre on what is seen
+    target = tuple((np.array(view.target) + middle).tolist())
+    return replace(view, target=target, span=tuple((1.03 * (high - low)[:2]).tolist()))
+
+
+def picture(subject: Subject, view: View, recording: Recording, tick: int, width: int, height: int) -> str:
+    """Draw one moment as SVG without its outer element; colours come from the page's style.
+
+    Args:
+        subject: arm and board.
+        view: of `fit`.
+        recording: what happened.
+        tick: index into its trace.
+        width, height: of the picture, px.
+    """
+    scale = view.scale(width, height)
+    board = recording.boards[min(tick // recording.board_every, len(recording.boards) - 1)]
+    corners = view.project(subject.board_corners(), width, height)
+    parts = [f'<polygon class="board" points="{_points(corners)}"/>', _ink(board, corners)]
+    q = recording.trace["q"][tick : tick + 1]
+    starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
+    flat = [np.stack([x[0, :, 0], x[0, :, 1], np.full(len(radii), subject.board.centre[2])], axis=1) for x in (starts, ends)]
+    shadow = [view.project(x, width, height) for x in flat]
+    parts.append('<g class="shadow">' + "".join(_line(a, b, 2 * scale * r) for a, b, r in zip(*shadow, radii, strict=True)) + "</g>")
+    things: list[tuple[float, str]] = []
+    for a, b, r in zip(view.project(starts[0], width, height), view.project(ends[0], width, height), radii, strict=True):
+        things.append(((a[2] + b[2]) / 2, _capsule(a, b, scale * r)))
+    if subject.tool.pad_half_size is not None:
+        centre, half, rotation = pad_box(subject.arm, subject.tool, q)
+        box = view.project(centre[0] + (_CORNERS * half) @ rotation[0].T, width, height)
+        things.append((box[:, 2].mean(), _box(box)))
+    if recording.obstacle is not None:
+        places = recording.trace["obstacle_position"][:, 0]
+        rest, now = view.project(places[0], width, height), view.project(places[tick], width, height)
+        things.append((rest[2] - 1e-3, _obstacle(rest, recording.obstacle, scale, view, "rest")))
+        things.append((now[2], _obstacle(now, recording.obstacle, scale, view, "obstacle")))
+    parts += [svg for _, svg in sorted(things, key=lambda thing: thing[0])]
+    return "".join(parts)
+
+
+def _ink(board: np.ndarray, corners: np.ndarray) -> str:
+    """Ink and object as an image, mapped onto the board: columns along y, rows along x."""
+    from matplotlib.image import imsave  # the heavy part of this room, wanted only where something is drawn
+
+    rgba = np.zeros((*board.shape, 4), dtype=np.uint8)
+    for value, rgb in ((INK, INK_RGB), (OBJECT, OBJECT_RGB)):
+        rgba[board == value] = (*rgb, 255)
+    buffer = io.BytesIO()
+    imsave(buffer, rgba, format="png")
+    rows, columns = board.shape
+    right, down = (corners[3] - corners[0])[:2] / columns, (corners[1] - corners[0])[:2] / rows
+    matrix = " ".join(f"{x:.5g}" for x in (*right, *down, *corners[0, :2]))
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return (
+        f'<image width="{columns}" height="{rows}" preserveAspectRatio="none" transform="matrix({matrix})" '
+        f'href="data:image/png;base64,{data}"/>'
+    )
+
+
+def _points(points: np.ndarray) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points[:, :2])
+
+
+def _line(a: np.ndarray, b: np.ndarray, width: float, extra: str = "") -> str:
+    # A line of no length has no round ends in some viewers.
+    return f'<line x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0] + 0.01:.2f}" y2="{b[1]:.1f}" stroke-width="{width:.1f}"{extra}/>'
+
+
+def _capsule(a: np.ndarray, b: np.ndarray, radius: float) -> str:
+    up = np.array([0.0, -0.28 * radius, 0.0])
+    return (
+        _line(a, b, 2 * radius + 1.2, ' class="edge"')
+        + _line(a, b, 2 * radius, ' class="arm"')
+        + _line(a + up, b + up, radius, ' class="shine"')
+    )
+
+
+def _box(corners: np.ndarray) -> str:
+    nearest = sorted(_FACES, key=lambda face: corners[list(face), 2].mean())[3:]
+    return "".join(f'<polygon class="pad" points="{_points(corners[list(face)])}"/>' for face in nearest)
+
+
+def _obstacle(centre: np.ndarray, shape: tuple[float, float], scale: float, view: View, name: str) -> str:
+    """A sphere, or a standing cylinder of exact outline: between two ellipses."""
+    r, half = scale * shape[0], scale * shape[1] * math.cos(view.elevation)
+    x, y = centre[:2]
+    if half == 0:
+        return f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>'
+    flat = r * math.sin(view.elevation)
+    side = f"M{x - r:.1f} {y - half:.1f}V{y + half:.1f}A{r:.1f} {flat:.1f} 0 0 0 {x + r:.1f} {y + half:.1f}V{y - half:.1f}"
+    lid = f'<ellipse class="{name}" cx="{x:.1f}" cy="{y - half:.1f}" rx="{r:.1f}" ry="{flat:.1f}"/>'
+    return f'<path class="{name}" d="{side}"/>{lid}'

@@ -1,0 +1,75 @@
+"""The experiments' main figures as plain text."""
+
+import math
+from collections.abc import Sequence
+
+from contactsafe.report import data, rows
+from contactsafe.report.data import Experiment, Spread
+
+_LABEL = 31
+
+
+def terminal_table(experiments: Sequence[Experiment]) -> str:
+    """Write the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
+
+    The last columns give the ratio of the last controller's median to the baseline's, and the aim with "ok" or "MISSED"
+    where it can be judged.
+
+    Args:
+        experiments: what was measured.
+
+    Returns:
+        Lines joined by newlines, without one at the end.
+    """
+    names = data.controllers(experiments)
+    subject = names[-1] if names else ""
+    table: list[list[str]] = [["median [p5, p95] over seeds", "", *names, f"{subject}/{data.BASELINE}", "aim"]]
+    for experiment in experiments:
+        title = rows.TITLES.get(experiment.name, experiment.name)
+        scenario = None
+        for line in rows.lines(experiment, main_only=True):
+            if line.scenario != scenario:
+                scenario = line.scenario
+                table.append([f"{title}: {scenario}"])
+            row = line.row
+            aim = row.aim_in(line.scenario)
+            verdict = {True: " ok", False: " MISSED", None: ""}[line.verdict(subject)]
+            table.append(
+                [
+                    f"  {row.label}",
+                    row.unit,
+                    *(_cell(line.values.get(name), row.scale) for name in names),
+                    _ascii(data.number(data.ratio(line.values.get(subject), line.baseline))),
+                    _ascii(aim.text(row.unit)) + verdict if aim else "",
+                ]
+            )
+    return _align(table)
+
+
+def _cell(value: Spread | None, scale: float) -> str:
+    if value is None or not math.isfinite(value.median):
+        return "-"
+    median, p5, p95 = (_ascii(data.number(scale * x)) for x in (value.median, value.p5, value.p95))
+    return f"{median} [{p5}, {p95}]"
+
+
+def _align(table: list[list[str]]) -> str:
+    full = [cells for cells in table if len(cells) > 1]
+    widths = [max(len(cells[i]) for cells in full) for i in range(len(full[0]))]
+    out = []
+    for cells in table:
+        if len(cells) == 1:
+            out += ["", cells[0]]
+            continue
+        first, unit, *middle, aim = cells
+        padded = [first.ljust(max(widths[0], _LABEL)), unit.ljust(widths[1])]
+        padded += [cell.rjust(width) for cell, width in zip(middle, widths[2:-1], strict=True)]
+        out.append("  ".join([*padded, aim]).rstrip())
+    return "\n".join(out)
+
+
+def _ascii(text: str) -> str:
+    """Terminals and pipes of any encoding take it."""
+    for sign, plain in (("−", "-"), (data.MISSING, "-"), ("≤", "<="), ("≥", ">=")):
+        text = text.replace(sign, plain)
+    return text
