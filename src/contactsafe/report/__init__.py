@@ -1,4 +1,4 @@
-"""Data in, pages out: the table for the terminal, `summary.json` and the self-contained `report.html` of experiments."""
+"""Data in, pages out: a table for the terminal, `summary.json`, and `report.html`, which needs nothing but itself."""
 
 from contactsafe.report.output import prepare_output
 from contactsafe.report.page import write_report

@@ -1,6 +1,8 @@
 """What this room reads: experiments as it sees them, and small questions to ask of them."""
 
+import itertools
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol, TypedDict
 
@@ -11,7 +13,11 @@ BASELINE = "vices"
 
 MISSING = "–"
 
-_KNOWN = ("vices", "paper", "safe")
+COLOURS = {"vices": ("#c4480a", "#f58549"), "paper": ("#9c5b86", "#d99cc2"), "safe": ("#0067a3", "#5ab4ea")}
+"""Of the known controllers, in order, on light and dark ground: vermilion, purple, blue; colour-blind readers tell them
+apart too."""
+
+_SPARE = (("#00805d", "#3cc79f"), ("#7a6a00", "#e0cf4a"), ("#555555", "#b0b0b0"))
 
 
 class Spread(Protocol):
@@ -97,7 +103,18 @@ def find(experiments: Iterable[Experiment], name: str) -> Experiment | None:
 def controllers(experiments: Iterable[Experiment]) -> list[str]:
     """Name all controllers measured: the known ones first, baseline leading, then others as they come."""
     found = dict.fromkeys(name for e in experiments for rows in e.spreads().values() for name in rows)
-    return [name for name in _KNOWN if name in found] + [name for name in found if name not in _KNOWN]
+    return [name for name in COLOURS if name in found] + [name for name in found if name not in COLOURS]
+
+
+def colours(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Give each controller its colour on light and on dark ground, the same everywhere."""
+    spare = itertools.cycle(_SPARE)
+    return {name: COLOURS.get(name) or next(spare) for name in names}
+
+
+def css_variable(controller: str) -> str:
+    """Name the CSS variable that holds a controller's colour; film.js names it alike."""
+    return "--c-" + re.sub(r"[^A-Za-z0-9]", "-", controller)
 
 
 def recorded(experiment: Experiment, scenario: str) -> list[Recording]:

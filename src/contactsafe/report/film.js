@@ -12,6 +12,7 @@
       for (let j = 0; j < 3; j++) C[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
     return C;
   };
+  const variable = (controller) => `--c-${controller.replace(/[^A-Za-z0-9]/g, "-")}`;
   const element = (tag, className, parent, text) => {
     const node = document.createElement(tag);
     node.className = className;
@@ -83,7 +84,7 @@
       this.scene = scene;
       this.run = new Run(film, run);
       const box = element("div", "run", parent);
-      box.style.setProperty("--c", `var(--c-${CSS.escape(run.controller)})`);
+      box.style.setProperty("--c", `var(${variable(run.controller)})`);
       const head = element("div", "run-head", box);
       element("strong", "", head, run.controller);
       this.state = element("span", "state", head);
@@ -112,6 +113,7 @@
     }
 
     draw(time, view, style) {
+      if (!this.canvas.clientWidth) return; // not shown, as in print
       const now = this.run.at(time);
       this.drawScene(time, now, view, style);
       this.drawSpark(time, style);
@@ -277,7 +279,7 @@
     const read = (name) => css.getPropertyValue(name).trim();
     const style = { font: css.fontFamily, controller: {} };
     for (const name of ["edge", "arm", "shine", "board", "pad", "obstacle", "text"]) style[name] = read(`--${name}`);
-    for (const name of names) style.controller[name] = read(`--c-${CSS.escape(name)}`) || style.text;
+    for (const name of names) style.controller[name] = read(variable(name)) || style.text;
     return style;
   }
 

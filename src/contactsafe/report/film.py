@@ -103,7 +103,7 @@ def _force(recording: Recording, of: str) -> np.ndarray:
 
 
 def _ink_runs(boards: np.ndarray) -> np.ndarray:
-    """Code every cell of the boards (F, rows, columns) by its fate, run lengths coded: code, length, code, length, …"""
+    """Code the fate of every cell of the boards (F, rows, columns), as pairs of code and number of cells in a row."""
     has = boards == INK
     last = len(boards) - 1 - np.argmax(has[::-1], axis=0)
     gone = np.where(last == len(boards) - 1, _STAYS, last + 1 + _GONE_AT)

@@ -1,12 +1,16 @@
 """Curves over time as small SVG plots whose colours the page's style decides."""
 
 import io
+import itertools
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from contactsafe.report import data
 from contactsafe.report.data import Experiment, Recording
@@ -14,16 +18,11 @@ from contactsafe.report.data import Experiment, Recording
 Curve = Callable[[Recording], np.ndarray]
 """From a recording to one value a tick, (T,)."""
 
-COLOURS = {"vices": ("#c4480a", "#f58549"), "paper": ("#9c5b86", "#d99cc2"), "safe": ("#0067a3", "#5ab4ea")}
-"""Of the known controllers on light and dark ground: vermilion, purple, blue, apart for colour-blind readers too."""
-
-SPARE = (("#00805d", "#3cc79f"), ("#7a6a00", "#e0cf4a"), ("#555555", "#b0b0b0"))
-"""Of controllers not known, in the order they come."""
-
 _INK, _GRID, _BAND = "#010203", "#010204", "#010205"
 _BINS = 240
-_PANEL_IN, _NAME_IN = 0.95, 0.15  # inches: height of one panel of several, of a line of text
-_STYLE = {
+_PANEL_IN, _NAME_IN = 1.05, 0.15  # inches: height of one panel of several, of a line of text
+_LAYOUT = ConstrainedLayoutEngine(h_pad=0.03, w_pad=0.03, hspace=0.02)
+_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "contactsafe",
     "font.size": 8,
@@ -32,8 +31,8 @@ _STYLE = {
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
+    "axes.titlesize": 8,
+    "axes.titlepad": 4,
     "axes.titlelocation": "left",
     "text.color": _INK,
     "xtick.color": _INK,
@@ -45,10 +44,19 @@ _STYLE = {
 }
 
 
-def colours(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Give each controller its colour on light and dark ground, the same everywhere."""
-    spare = iter(SPARE * len(names))
-    return {name: COLOURS.get(name) or next(spare) for name in names}
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes:
+        label: of what is drawn, with its unit.
+        curve: what is drawn.
+        noisy: draw the mean as a line and what it scatters as a pale band.
+    """
+
+    label: str
+    curve: Curve
+    noisy: bool = False
 
 
 class Plotter:
@@ -60,15 +68,13 @@ class Plotter:
 
     def __init__(self, names: Sequence[str]):
         self._tokens = {name: f"#0102{16 + index:02x}" for index, name in enumerate(names)}
-        self._index = {name: index for index, name in enumerate(names)}
         self._count = 0
 
     def plot(
         self,
         experiment: Experiment,
         scenario: str,
-        panels: Sequence[tuple[str, Curve]],
-        title: str,
+        panels: Sequence[Panel],
         band: tuple[float, float] | None = None,
     ) -> str:
         """Draw panels under each other, one curve a controller, named at its end.
@@ -76,8 +82,7 @@ class Plotter:
         Args:
             experiment: whose recordings are drawn.
             scenario: which of them.
-            panels: label with unit, and what to draw.
-            title: above the first panel.
+            panels: what to draw, from top to bottom.
             band: span of time to be shaded, s.
 
         Returns:
@@ -86,38 +91,46 @@ class Plotter:
         recordings = data.recorded(experiment, scenario)
         if not recordings:
             return ""
-        height = 0.65 + (1.5 if len(panels) == 1 else _PANEL_IN) * len(panels)
+        height = 0.5 + (1.6 if len(panels) == 1 else _PANEL_IN) * len(panels)
         with rc_context(_STYLE):
-            figure = Figure(figsize=(3.5, height), layout="constrained")
-            figure.get_layout_engine().set(h_pad=0.03, w_pad=0.03, hspace=0.02)  # type: ignore[union-attr]
+            figure = Figure(figsize=(3.5, height), layout=_LAYOUT)
             axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-            axes[0].set_title(title)
-            for axis, (label, curve) in zip(axes, panels, strict=True):
-                self._panel(axis, recordings, curve, band)
-                axis.set_ylabel(label)
-            figure.align_ylabels(axes)
-            self._name_curves(axes[0], recordings, panels[0][1])
+            for axis, panel in zip(axes, panels, strict=True):
+                self._panel(axis, recordings, panel, band)
+            self._name_curves(axes[0], recordings, panels[0].curve)
             axes[-1].set_xlabel("time (s)")
             buffer = io.StringIO()
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-        return self._inline(buffer.getvalue(), f"{title}: {', '.join(label for label, _ in panels)} over time")
+        return self._inline(buffer.getvalue(), f"{scenario}: {', '.join(panel.label for panel in panels)} over time")
 
-    def _panel(self, axis, recordings: Sequence[Recording], curve: Curve, band: tuple[float, float] | None) -> None:
+    def _panel(self, axis, recordings: Sequence[Recording], panel: Panel, band: tuple[float, float] | None) -> None:
+        axis.set_title(panel.label)
         axis.grid(axis="y")
         axis.set_axisbelow(True)
         axis.locator_params(axis="y", nbins=4)
         if band is not None:
             axis.axvspan(*band, color=_BAND, linewidth=0)
         for recording in recordings:
-            times, values = thin(data.seconds(recording), curve(recording))
-            axis.plot(times, values, color=self._tokens[recording.controller], linewidth=1.0, solid_joinstyle="round")
+            times, values, colour = data.seconds(recording), panel.curve(recording), self._tokens[recording.controller]
+            if panel.noisy:
+                middle, low, mean, high = scatter(times, values)
+                axis.fill_between(middle, low, high, color=colour, alpha=0.22, linewidth=0)
+                times, values = middle, mean
+            axis.plot(*thin(times, values), color=colour, linewidth=0.9, solid_joinstyle="round")
         stop = max(data.seconds(recording)[-1] for recording in recordings)
         axis.set_xlim(0, stop)
+        if axis.dataLim.ymin >= 0:
+            axis.set_ylim(bottom=0)
 
     def _name_curves(self, axis, recordings: Sequence[Recording], curve: Curve) -> None:
-        """Write each controller's name right of where its curve ends, pushed apart where they would meet."""
+        """Write each controller's name at the right, as high as its curve ends, or as where the curves differ most."""
         low, high = axis.get_ylim()
-        ends = [float(np.mean(values[-50:])) for values in map(curve, recordings)]
+        curves = [curve(recording) for recording in recordings]
+        common = np.array([values[: min(map(len, curves))] for values in curves])
+        ends = np.array([np.mean(values[-50:]) for values in curves])
+        apart_most = common[:, int(np.argmax(np.ptp(common, axis=0)))]
+        if np.ptp(ends) < 0.1 * (high - low) <= np.ptp(apart_most):
+            ends = apart_most
         gap = (high - low) * _NAME_IN / _PANEL_IN
         for index, place in zip(np.argsort(ends), apart(np.sort(ends), gap), strict=True):
             name = recordings[index].controller
@@ -145,7 +158,7 @@ class Plotter:
         for token, style in {_INK: "currentColor", _GRID: "var(--grid)", _BAND: "var(--band)"}.items():
             svg = svg.replace(token, style)
         for name, token in self._tokens.items():
-            svg = svg.replace(token, f"var(--c{self._index[name]})")
+            svg = svg.replace(token, f"var({data.css_variable(name)})")
         return re.sub(r"font: (bold |700 )?([\d.]+)px [^;\"]*", r"font: \1\2px var(--sans)", svg).strip()
 
 
@@ -160,11 +173,28 @@ def thin(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         return times, values
     edges = np.linspace(0, len(values), _BINS + 1).astype(int)
     kept = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in itertools.pairwise(edges):
         part = values[start:stop]
         kept += sorted({start + int(np.argmin(part)), start + int(np.argmax(part))})
     index = np.array(sorted({0, *kept, len(values) - 1}))
     return times[index], values[index]
+
+
+def scatter(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Summarise each of some hundred spans: middle of its time, smallest, mean and largest value.
+
+    Args:
+        times: (T,), s.
+        values: (T,).
+    """
+    starts = np.unique(np.linspace(0, len(values), min(len(values), _BINS) + 1).astype(int))[:-1]
+    counts = np.diff(starts, append=len(values))
+    return (
+        np.add.reduceat(times, starts) / counts,
+        np.minimum.reduceat(values, starts),
+        np.add.reduceat(values, starts) / counts,
+        np.maximum.reduceat(values, starts),
+    )
 
 
 def apart(places: np.ndarray, gap: float) -> list[float]:

@@ -1,6 +1,7 @@
 """Which figures are shown, what they are called, and what is aimed at."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from contactsafe.report.data import BASELINE, Experiment, Spread, number, ratio
@@ -36,9 +37,9 @@ class Aim:
         elif self.below is not None:
             parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
         if self.share is not None:
-            parts.append(f"≤ {_fraction(self.share)} of {BASELINE}")
+            parts.append(f"at most {_fraction(self.share)} of {BASELINE}")
         if self.at_least_share is not None:
-            parts.append(f"≥ {_fraction(self.at_least_share)} of {BASELINE}")
+            parts.append(f"at least {_fraction(self.at_least_share)} of {BASELINE}")
         if self.where_baseline_above is not None:
             parts.append(f"where {BASELINE} passes {self.where_baseline_above:g}")
         return " ".join(parts)
@@ -52,7 +53,7 @@ class Aim:
             return None
         found = scale * (value.max if self.worst else value.median)
         of_baseline = ratio(value, baseline)
-        if (self.share is not None or self.at_least_share is not None) and of_baseline != of_baseline:
+        if (self.share is not None or self.at_least_share is not None) and not math.isfinite(of_baseline):
             return None
         return (
             (self.below is None or found <= self.below)
@@ -165,6 +166,18 @@ def lines(experiment: Experiment, main_only: bool = False) -> list[Line]:
     return out
 
 
+def groups(experiment: Experiment, main_only: bool = False) -> list[tuple[str, list[tuple[str, Line]]]]:
+    """Arrange `lines` for a table: headings, and under each the labelled lines.
+
+    Scenarios head the figures; where every scenario has but one and the same figure, that figure heads the scenarios.
+    """
+    found = lines(experiment, main_only)
+    scenarios = list(dict.fromkeys(line.scenario for line in found))
+    if len(scenarios) == len(found) > 1 and len({line.row for line in found}) == 1:
+        return [(found[0].row.label, [(line.scenario, line) for line in found])]
+    return [(name, [(line.row.label, line) for line in found if line.scenario == name]) for name in scenarios]
+
+
 def _rows_of_unknown(by_controller: Mapping[str, Mapping[str, Spread]]) -> list[Row]:
     names = dict.fromkeys(name for metrics in by_controller.values() for name in metrics)
     rows = []
@@ -175,21 +188,20 @@ def _rows_of_unknown(by_controller: Mapping[str, Mapping[str, Spread]]) -> list[
     return rows
 
 
-def shortfalls(experiment: Experiment, names: Sequence[str]) -> list[str]:
-    """Say in sentences where controllers other than the baseline miss an aim, with the figures."""
+def shortfalls(experiment: Experiment, controller: str) -> list[str]:
+    """Say in sentences which aims a controller misses, with the figures."""
     out = []
     for line in lines(experiment):
         aim = line.row.aim_in(line.scenario)
-        for name in names:
-            if aim is None or name == BASELINE or line.verdict(name) is not False:
-                continue
-            value, unit = line.values[name], line.row.unit
-            found = line.row.scale * (value.max if aim.worst else value.median)
-            sentence = f"{name}, {line.scenario}: {line.row.label} is {number(found)} {unit}"
-            share = ratio(value, line.baseline)
-            if line.baseline is not None and share == share:
-                sentence += f", {number(share)} of the {number(line.row.scale * line.baseline.median)} {unit} of {BASELINE}"
-            out.append(f"{sentence}; the aim is {aim.text(unit)}.")
+        if aim is None or line.verdict(controller) is not False:
+            continue
+        value, unit = line.values[controller], line.row.unit
+        found = line.row.scale * (value.max if aim.worst else value.median)
+        sentence = f"{line.scenario}: {line.row.label} is {number(found)} {unit}"
+        share = ratio(value, line.baseline)
+        if line.baseline is not None and not aim.worst and math.isfinite(share):
+            sentence += f", {number(share)} of the {number(line.row.scale * line.baseline.median)} {unit} of {BASELINE}"
+        out.append(f"{sentence}; the aim is {aim.text(unit)}.")
     return out
 
 

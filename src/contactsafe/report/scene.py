@@ -3,7 +3,7 @@
 import base64
 import io
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +17,7 @@ INK, OBJECT = 1, 2
 
 INK_RGB, OBJECT_RGB = (24, 48, 104), (20, 20, 22)
 
-_AZIMUTH, _ELEVATION = math.radians(-28.0), math.radians(24.0)
+_AZIMUTH, _ELEVATION = math.radians(22.0), math.radians(22.0)
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 
@@ -79,23 +79,20 @@ class View:
 
 def fit(subject: Subject, recordings: list[Recording]) -> View:
     """Choose the view in which the arm of all recordings, the board and the obstacle are seen."""
-    points = [subject.board_corners()]
+    spheres = [(subject.board_corners(), 0.0)]  # everything seen lies within these: centres (…, 3), m, and radius, m
     for recording in recordings:
         q = recording.trace["q"][:: max(1, len(recording.trace) // 60)]
         starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
-        middle = np.concatenate([starts, ends], axis=1).reshape(-1, 3)
-        points += [middle + radii.max(), middle - radii.max()]
+        for k, radius in enumerate(radii):
+            spheres += [(starts[:, k], radius), (ends[:, k], radius)]
         if recording.obstacle is not None:
-            centre = recording.trace["obstacle_position"][:, 0]
-            reach = max(recording.obstacle)
-            points += [centre.max(axis=0)[None] + reach, centre.min(axis=0)[None] - reach]
-    cloud = np.concatenate(points)
-    view = View(tuple(((cloud.min(axis=0) + cloud.max(axis=0)) / 2).tolist()), (1.0, 1.0))
-    seen = (cloud - view.target) @ view.axes().T
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    middle = view.axes()[:2].T @ ((low + high)[:2] / 2)  # recentre on what is seen
-    target = tuple((np.array(view.target) + middle).tolist())
-    return replace(view, target=target, span=tuple((1.03 * (high - low)[:2]).tolist()))
+            spheres.append((recording.trace["obstacle_position"][:, 0], max(recording.obstacle)))
+    axes = View((0.0, 0.0, 0.0), (1.0, 1.0)).axes()
+    low = np.min([(centres @ axes.T).min(axis=0) - radius for centres, radius in spheres], axis=0)
+    high = np.max([(centres @ axes.T).max(axis=0) + radius for centres, radius in spheres], axis=0)
+    target = axes.T @ ((low + high) / 2)
+    width, height = 1.04 * (high - low)[:2]
+    return View((float(target[0]), float(target[1]), float(target[2])), (float(width), float(height)))
 
 
 def picture(subject: Subject, view: View, recording: Recording, tick: int, width: int, height: int) -> str:
@@ -114,11 +111,19 @@ def picture(subject: Subject, view: View, recording: Recording, tick: int, width
     parts = [f'<polygon class="board" points="{_points(corners)}"/>', _ink(board, corners)]
     q = recording.trace["q"][tick : tick + 1]
     starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
-    flat = [np.stack([x[0, :, 0], x[0, :, 1], np.full(len(radii), subject.board.centre[2])], axis=1) for x in (starts, ends)]
+    flat = [
+        np.stack([x[0, :, 0], x[0, :, 1], np.full(len(radii), subject.board.centre[2])], axis=1) for x in (starts, ends)
+    ]
     shadow = [view.project(x, width, height) for x in flat]
-    parts.append('<g class="shadow">' + "".join(_line(a, b, 2 * scale * r) for a, b, r in zip(*shadow, radii, strict=True)) + "</g>")
+    parts.append(
+        '<g class="shadow">'
+        + "".join(_line(a, b, 2 * scale * r) for a, b, r in zip(*shadow, radii, strict=True))
+        + "</g>"
+    )
     things: list[tuple[float, str]] = []
-    for a, b, r in zip(view.project(starts[0], width, height), view.project(ends[0], width, height), radii, strict=True):
+    for a, b, r in zip(
+        view.project(starts[0], width, height), view.project(ends[0], width, height), radii, strict=True
+    ):
         things.append(((a[2] + b[2]) / 2, _capsule(a, b, scale * r)))
     if subject.tool.pad_half_size is not None:
         centre, half, rotation = pad_box(subject.arm, subject.tool, q)
@@ -158,7 +163,8 @@ def _points(points: np.ndarray) -> str:
 
 def _line(a: np.ndarray, b: np.ndarray, width: float, extra: str = "") -> str:
     # A line of no length has no round ends in some viewers.
-    return f'<line x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0] + 0.01:.2f}" y2="{b[1]:.1f}" stroke-width="{width:.1f}"{extra}/>'
+    ends = f'x1="{a[0]:.1f}" y1="{a[1]:.1f}" x2="{b[0] + 0.01:.2f}" y2="{b[1]:.1f}"'
+    return f'<line {ends} stroke-width="{width:.1f}"{extra}/>'
 
 
 def _capsule(a: np.ndarray, b: np.ndarray, radius: float) -> str:
@@ -182,6 +188,8 @@ def _obstacle(centre: np.ndarray, shape: tuple[float, float], scale: float, view
     if half == 0:
         return f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>'
     flat = r * math.sin(view.elevation)
-    side = f"M{x - r:.1f} {y - half:.1f}V{y + half:.1f}A{r:.1f} {flat:.1f} 0 0 0 {x + r:.1f} {y + half:.1f}V{y - half:.1f}"
+    side = (
+        f"M{x - r:.1f} {y - half:.1f}V{y + half:.1f}A{r:.1f} {flat:.1f} 0 0 0 {x + r:.1f} {y + half:.1f}V{y - half:.1f}"
+    )
     lid = f'<ellipse class="{name}" cx="{x:.1f}" cy="{y - half:.1f}" rx="{r:.1f}" ry="{flat:.1f}"/>'
     return f'<path class="{name}" d="{side}"/>{lid}'

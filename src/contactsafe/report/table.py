@@ -26,24 +26,23 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
     table: list[list[str]] = [["median [p5, p95] over seeds", "", *names, f"{subject}/{data.BASELINE}", "aim"]]
     for experiment in experiments:
         title = rows.TITLES.get(experiment.name, experiment.name)
-        scenario = None
-        for line in rows.lines(experiment, main_only=True):
-            if line.scenario != scenario:
-                scenario = line.scenario
-                table.append([f"{title}: {scenario}"])
-            row = line.row
-            aim = row.aim_in(line.scenario)
-            verdict = {True: " ok", False: " MISSED", None: ""}[line.verdict(subject)]
-            table.append(
-                [
-                    f"  {row.label}",
-                    row.unit,
-                    *(_cell(line.values.get(name), row.scale) for name in names),
-                    _ascii(data.number(data.ratio(line.values.get(subject), line.baseline))),
-                    _ascii(aim.text(row.unit)) + verdict if aim else "",
-                ]
-            )
+        for heading, labelled in rows.groups(experiment, main_only=True):
+            table.append([f"{title}: {heading}"])
+            table += [_row(label, line, names) for label, line in labelled]
     return _align(table)
+
+
+def _row(label: str, line: rows.Line, names: Sequence[str]) -> list[str]:
+    row, subject = line.row, names[-1]
+    aim = row.aim_in(line.scenario)
+    verdict = {True: " ok", False: " MISSED", None: ""}[line.verdict(subject)]
+    return [
+        f"  {label}",
+        row.unit,
+        *(_cell(line.values.get(name), row.scale) for name in names),
+        _ascii(data.number(data.ratio(line.values.get(subject), line.baseline))),
+        _ascii(aim.text(row.unit)) + verdict if aim else "",
+    ]
 
 
 def _cell(value: Spread | None, scale: float) -> str:
@@ -70,6 +69,6 @@ def _align(table: list[list[str]]) -> str:
 
 def _ascii(text: str) -> str:
     """Terminals and pipes of any encoding take it."""
-    for sign, plain in (("−", "-"), (data.MISSING, "-"), ("≤", "<="), ("≥", ">=")):
+    for sign, plain in (("−", "-"), (data.MISSING, "-")):
         text = text.replace(sign, plain)
     return text

@@ -1,0 +1,54 @@
+"""`report.html`: one page that needs nothing but itself."""
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from contactsafe.report import data
+from contactsafe.report.data import Experiment, RunFacts
+from contactsafe.report.output import prepare_output, write_whole
+from contactsafe.report.summary import write_summary
+
+
+def write_report(folder, experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> Path:
+    """Write `report.html` and `summary.json`.
+
+    Args:
+        folder: where to.
+        experiments: what was measured.
+        facts: of the run; see `RunFacts`.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OutputError: the folder cannot be written; no half-written file is left behind.
+    """
+    folder = prepare_output(folder)
+    page = render(experiments, facts)
+    write_summary(folder, experiments, facts)
+    return write_whole(folder / "report.html", page)
+
+
+def render(experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> str:
+    """Give the page as text."""
+    from contactsafe.report import sections  # brings matplotlib, which the other commands need not wait for
+
+    names = data.controllers(experiments)
+    parts = sections.parts(experiments, names, facts)
+    return Template(_file("page.html")).substitute(
+        parts, style=_colours(names) + _file("style.css"), script=_file("film.js")
+    )
+
+
+def _colours(names: Sequence[str]) -> str:
+    """Each controller's colour as a CSS variable, on light and on dark ground."""
+    chosen = data.colours(names)
+    light, dark = ("".join(f"{data.css_variable(name)}: {chosen[name][i]}; " for name in names) for i in (0, 1))
+    return f":root {{ {light}}}\n@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark}}} }}\n"
+
+
+def _file(name: str) -> str:
+    return (resources.files("contactsafe.report") / name).read_text(encoding="utf-8")

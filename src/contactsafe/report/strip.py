@@ -1,0 +1,66 @@
+"""Picture strips: a few moments of every run, for paper and for browsers without scripts."""
+
+from html import escape
+
+import numpy as np
+
+from contactsafe.report import data
+from contactsafe.report.data import Experiment, Recording
+from contactsafe.report.film import first_contact
+from contactsafe.report.scene import Subject, fit, picture
+from contactsafe.report.tables import coloured
+
+WIDTH, HEIGHT = 220, 220
+"""Of one picture, px."""
+
+
+def strips(experiment: Experiment, subject: Subject) -> str:
+    """Draw one strip a recorded scenario: a row a controller, a column a moment, the force written beneath.
+
+    Args:
+        experiment: with recordings.
+        subject: arm and board.
+    """
+    return "\n".join(_strip(name, data.recorded(experiment, name), subject) for name in data.scenarios(experiment))
+
+
+def moments(recordings: list[Recording]) -> list[int]:
+    """Choose ticks that tell the story: start, approach, first contact, the greatest force, end; else even steps."""
+    end = max(len(recording.trace) for recording in recordings) - 1
+    contacts = [tick for recording in recordings if (tick := first_contact(recording)) is not None]
+    if not contacts:
+        return [round(share * end) for share in (0, 0.25, 0.5, 0.75, 1)]
+    strongest = max(recordings, key=lambda recording: recording.trace["obstacle_force"].max())
+    first, most = min(contacts), int(np.argmax(strongest.trace["obstacle_force"]))
+    return sorted({0, first // 2, first, most, end})
+
+
+def _strip(scenario: str, recordings: list[Recording], subject: Subject) -> str:
+    if not recordings:
+        return ""
+    view = fit(subject, recordings)
+    ticks = moments(recordings)
+    body = []
+    for recording in recordings:
+        cells = []
+        for tick in ticks:
+            at = min(tick, len(recording.trace) - 1)
+            drawn = picture(subject, view, recording, at, WIDTH, HEIGHT)
+            cells.append(
+                f'<td><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(recording.controller)} at '
+                f'{tick / 1000:.2f} s">{drawn}</svg>{_force(recording, at)}</td>'
+            )
+        body.append(
+            f"<tr><th {coloured(recording.controller)}>{escape(recording.controller)}</th>{''.join(cells)}</tr>"
+        )
+    head = "".join(f"<th>{tick / 1000:.2f} s</th>" for tick in ticks)
+    return (
+        f'<figure class="strip"><table><thead><tr><th></th>{head}</tr></thead><tbody>{"".join(body)}</tbody></table>'
+        f"<figcaption>{escape(scenario)}: the same moments of every run.</figcaption></figure>"
+    )
+
+
+def _force(recording: Recording, tick: int) -> str:
+    row = recording.trace[tick]
+    value = row["obstacle_force"] if recording.obstacle else float(np.linalg.norm(row["tool_force"]))
+    return f"{data.number(float(value))} N"

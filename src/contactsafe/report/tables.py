@@ -1,0 +1,149 @@
+"""Figures as HTML: cards with bars, tables with spreads, sentences about what was missed."""
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+from contactsafe.report import data, rows
+from contactsafe.report.data import BASELINE, MISSING, Experiment, Spread
+from contactsafe.report.rows import Line
+
+HEADLINES = (
+    ("joint-safety", "bottle", "contact_steady_n", "Steady force on the bottle the arm ran into"),
+    ("disturbance", "push on link 5 while holding", "error_max_mm", "Tool error under a push on the forearm"),
+    ("task-safety", "wiping", "ink_removed", "Ink wiped off boards never seen before"),
+)
+"""Experiment, scenario and metric of each big figure, and what it is."""
+
+
+def coloured(controller: str) -> str:
+    """Give the style attribute that makes an element a controller's."""
+    return f'style="--c: var({data.css_variable(controller)})"'
+
+
+def cards(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
+    """Write the big figures: the last controller's median, and all medians as bars."""
+    out = []
+    for experiment_name, scenario, metric, label in HEADLINES:
+        experiment = data.find(experiments, experiment_name)
+        if experiment is None:
+            continue
+        found = [line for line in rows.lines(experiment) if (line.scenario, line.row.metric) == (scenario, metric)]
+        out += [_card(line, label, names) for line in found]
+    return "\n".join(out)
+
+
+def _card(line: Line, label: str, names: Sequence[str]) -> str:
+    medians = {name: line.row.scale * _median(line.values.get(name)) for name in names}
+    most = max((value for value in medians.values() if math.isfinite(value)), default=0.0)
+    bars = []
+    for name, value in medians.items():
+        width = 100 * value / most if math.isfinite(value) and most > 0 else 0.0
+        bars.append(
+            f'<span class="name" {coloured(name)}>{escape(name)}</span>'
+            f'<i style="--c: var({data.css_variable(name)}); width: {width:.1f}%"></i>'
+            f"<b>{data.number(value)} {line.row.unit}</b>"
+        )
+    subject = names[-1]
+    return (
+        f'<div class="card"><h3>{escape(label)}</h3>'
+        f'<p class="big" {coloured(subject)}>{data.number(medians[subject])} '
+        f"<small>{line.row.unit}, {escape(subject)}</small></p>"
+        f'<div class="bars">{"".join(bars)}</div></div>'
+    )
+
+
+def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bool = False) -> str:
+    """Write a table of figures: median and [5th, 95th percentile] over seeds, ratios to the baseline, aims.
+
+    Args:
+        experiments: whose figures.
+        names: controllers, one column each.
+        main_only: the summary's rows alone, each scenario headed by its experiment.
+    """
+    others = [name for name in names if name != BASELINE] if BASELINE in names else []
+    head = "".join(f"<th {coloured(name)}>{escape(name)}</th>" for name in names)
+    head += "".join(f"<th>{escape(name)} / {BASELINE}</th>" for name in others)
+    body = []
+    for experiment in experiments:
+        title = f"{rows.TITLES.get(experiment.name, experiment.name)}: " if main_only else ""
+        for heading, labelled in rows.groups(experiment, main_only):
+            width = 3 + len(names) + len(others)
+            body.append(f'<tr><th colspan="{width}" scope="rowgroup">{escape(title + heading)}</th></tr>')
+            body += [_row(experiment, label, line, names, others) for label, line in labelled]
+    return (
+        '<div class="wide"><table><thead><tr><th>median [p5, p95] over seeds</th><th></th>'
+        f'{head}<th class="aim">aim</th></tr></thead><tbody>{"".join(body)}</tbody></table></div>'
+        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the median, “always” on the largest of all runs.</p>'
+    )
+
+
+def _row(experiment: Experiment, label: str, line: Line, names: Sequence[str], others: Sequence[str]) -> str:
+    row = line.row
+    cells = [f"<td>{escape(label)}</td>", f'<td class="unit">{row.unit}</td>']
+    for name in names:
+        value = line.values.get(name)
+        where = f"{experiment.name}/{line.scenario}/{name}/{row.metric}"
+        exact = f' data-median="{value.median:.6g}"' if value is not None and math.isfinite(value.median) else ""
+        cells.append(f'<td data-figure="{escape(where)}"{exact}>{_spread(value, row.scale)}</td>')
+    cells += [
+        f"<td>{data.number(data.ratio(line.values.get(name), line.baseline))}{_mark(line, name)}</td>"
+        for name in others
+    ]
+    aim = row.aim_in(line.scenario)
+    cells.append(f'<td class="aim">{escape(aim.text(row.unit)) if aim else ""}</td>')
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _mark(line: Line, name: str) -> str:
+    """A tick or a cross where the aim can be judged, and room for it where not: ratios stay aligned."""
+    reached = line.verdict(name)
+    if reached is None:
+        return '<span class="mark"></span>'
+    kind, title, sign = ("yes", "reached", "✓") if reached else ("no", "missed", "✗")
+    return f'<span class="mark {kind}" title="{title}">{sign}</span>'
+
+
+def tally(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
+    """Say in a sentence how many aims of all experiments each controller but the baseline reaches."""
+    said = []
+    for name in names:
+        reached, total = (sum(counts) for counts in zip(*(_count(e, name) for e in experiments), strict=True))
+        if name != BASELINE and total:
+            said.append(f'<strong class="name" {coloured(name)}>{escape(name)}</strong> reaches {reached} of {total}')
+    return f"<p>Of the aims that these runs can judge, {', '.join(said)}.</p>" if said else ""
+
+
+def verdict(experiment: Experiment, names: Sequence[str]) -> str:
+    """Say for every controller but the baseline how many aims it reaches, and which it misses by how much."""
+    out = []
+    for name in names:
+        reached, total = _count(experiment, name)
+        if name == BASELINE or not total:
+            continue
+        label = f'<strong class="name" {coloured(name)}>{escape(name)}</strong>'
+        if reached == total:
+            out.append(f'<div class="reached"><p>{label} reaches {reached} of {total} aims.</p></div>')
+            continue
+        points = "".join(f"<li>{escape(sentence)}</li>" for sentence in rows.shortfalls(experiment, name))
+        out.append(
+            f'<div class="missed"><p>{label} misses {total - reached} of {total} aims:</p><ul>{points}</ul></div>'
+        )
+    return "".join(out)
+
+
+def _count(experiment: Experiment, name: str) -> tuple[int, int]:
+    """Aims reached, and aims that could be judged."""
+    judged = [line.verdict(name) for line in rows.lines(experiment)]
+    return sum(reached is True for reached in judged), sum(reached is not None for reached in judged)
+
+
+def _median(value: Spread | None) -> float:
+    return math.nan if value is None else value.median
+
+
+def _spread(value: Spread | None, scale: float) -> str:
+    if value is None or not math.isfinite(value.median):
+        return MISSING
+    median, p5, p95 = (data.number(scale * x) for x in (value.median, value.p5, value.p95))
+    return f"{median} <span>[{p5}, {p95}]</span>"

@@ -1,0 +1,180 @@
+"""report.html: whole, alone, and true to the figures it was made from."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from contactsafe.experiments.results import Experiment, Trial
+from contactsafe.report import write_report
+from contactsafe.report.film import FORCE_UNIT, Q_UNIT
+
+VOID = {"meta", "link", "input", "br", "hr", "img"}
+
+
+class Page(HTMLParser):
+    """Checks that elements nest, and collects what tests ask for."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.figures, self.addresses, self.faults = [], [], {}, [], []
+        self.text = ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.handle_startendtag(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        values = dict(attrs)
+        if len(values) != len(attrs):
+            self.faults.append(f"{tag} repeats an attribute: {attrs}")
+        if "id" in values:
+            self.ids.append(values["id"])
+        if "data-figure" in values:
+            self.figures[values["data-figure"]] = values.get("data-median")
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "srcset", "action")]
+
+    def handle_data(self, data):
+        if not {"script", "style"} & set(self.open):
+            self.text += data
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(f"</{tag}> at line {self.getpos()[0]} closes nothing")
+
+
+@pytest.fixture(scope="module")
+def parsed(page):
+    return Page(page)
+
+
+def test_elements_nest(parsed):
+    assert parsed.faults == []
+    assert parsed.open == []
+
+
+def test_ids_are_unique_and_links_lead_somewhere(parsed):
+    assert len(parsed.ids) == len(set(parsed.ids))
+    inside = {address[1:] for address in parsed.addresses if address.startswith("#")}
+    assert inside <= set(parsed.ids)
+
+
+def test_page_needs_nothing_but_itself(page, parsed):
+    assert "http://" not in page
+    assert "https://" not in page
+    assert [a for a in parsed.addresses if not a.startswith(("#", "data:"))] == []
+    assert not re.search(r"@import|url\((?!#)", page)
+
+
+def test_no_nan_is_shown(page, parsed):
+    assert len(parsed.text) > 1000
+    assert not re.search(r"\b(nan|inf|None)\b", parsed.text, re.IGNORECASE)
+    plots = "".join(re.findall(r"<svg.*?</svg>", page, re.DOTALL))
+    assert not re.search(r"\bnan\b", re.sub(r'"data:image[^"]*"', "", plots), re.IGNORECASE)
+
+
+def test_page_is_small(folder):
+    assert (folder / "report.html").stat().st_size < 4_000_000
+
+
+def test_every_figure_is_the_spreads_median(parsed, experiments):
+    known = 0
+    for experiment in experiments:
+        for scenario, by_controller in experiment.spreads().items():
+            for controller, metrics in by_controller.items():
+                for metric, spread in metrics.items():
+                    shown = parsed.figures.get(f"{experiment.name}/{scenario}/{controller}/{metric}", "absent")
+                    if metric == "something_new":
+                        assert shown == "absent"
+                    elif spread.n == 0:
+                        assert shown is None
+                    else:
+                        assert float(shown) == pytest.approx(spread.median, rel=1e-5)
+                        known += 1
+    assert known == len(parsed.figures) - 1  # all but paper's time to a clean board
+
+
+def test_missing_figure_is_a_dash(page):
+    assert '<td data-figure="task-safety/wiping/paper/time_s">–</td>' in page
+
+
+def test_headline_shows_the_medians(page, experiments):
+    cards = page[page.index('class="cards"') : page.index("<main>")]
+    spread = experiments[1].spreads()["bottle"]
+    for controller in ("vices", "paper", "safe"):
+        assert f"<b>{spread[controller]['contact_steady_n'].median:.3g} N</b>" in cards
+
+
+def test_page_says_where_paper_falls_short(page, experiments):
+    metrics = {name: row["contact_steady_n"].median for name, row in experiments[1].spreads()["bottle"].items()}
+    share = metrics["paper"] / metrics["vices"]
+    assert (
+        f"bottle: contact force, steady is {metrics['paper']:.1f} N, {share:.2f} of the {metrics['vices']:.1f} N of "
+        "vices; the aim is at most 1/3 of vices." in page
+    )
+    assert "</strong> misses 6 of 6 aims:" in page
+
+
+def test_page_says_where_all_aims_are_reached(page):
+    section = page[page.index('<section id="joint-safety">') : page.index('<section id="disturbance">')]
+    assert re.search(r">safe</strong> reaches 6 of 6 aims\.", section)
+
+
+def test_film_holds_the_recordings(page, experiments):
+    text = re.search(r'id="film-joint-safety">(.*?)</script>', page, re.DOTALL).group(1)
+    film = json.loads(text)
+    assert [scene["name"] for scene in film["scenes"]] == ["bottle", "thrust meter"]
+    for scene in film["scenes"]:
+        for run in scene["runs"]:
+            recording = next(
+                r for r in experiments[1].recordings if (r.scenario, r.controller) == (scene["name"], run["controller"])
+            )
+            values = np.frombuffer(base64.b64decode(run["channels"]), "<i2").reshape(run["frames"], -1)
+            assert run["frames"] == 360
+            np.testing.assert_allclose(values[:, :7] * Q_UNIT, recording.trace["q"][ticks(360)], atol=Q_UNIT)
+            assert values[:, 10].max() * FORCE_UNIT == pytest.approx(
+                recording.trace["obstacle_force"].max(), abs=FORCE_UNIT
+            )
+            np.testing.assert_array_equal(boards_of(run), recording.boards)
+
+
+def ticks(frames):
+    return np.round(np.arange(frames) * 1000 / 60).astype(int)
+
+
+def boards_of(run):
+    """Decode as film.js does: clean from frame code − 2 on, 1 the object, 65535 ink that stays."""
+    runs = np.frombuffer(base64.b64decode(run["ink"]), "<u2").reshape(-1, 2)
+    codes = np.repeat(runs[:, 0], runs[:, 1]).reshape(run["cells"])
+    frames = np.arange(31)[:, None, None]
+    ink = (codes > 1) & ((codes == 65535) | (frames < codes.astype(int) - 2))
+    return np.where(codes == 1, 2, ink)
+
+
+def test_names_are_escaped(fakes, tmp_path):
+    trials = (Trial("<b>&", "vices", 0, {"depth_mm": 1.5}), Trial("<b>&", "<i>x", 0, {"depth_mm": float("nan")}))
+    path = write_report(tmp_path, [Experiment("<odd>", "Is 1 < 2?", trials)], {"command": "contactsafe <demo>"})
+    parsed = Page(path.read_text(encoding="utf-8"))
+    assert parsed.faults == []
+    assert parsed.figures == {"<odd>/<b>&/vices/depth_mm": "1.5", "<odd>/<b>&/<i>x/depth_mm": None}
+
+
+def test_one_controller_and_no_recordings(fakes, tmp_path):
+    experiment = fakes.task_safety()
+    alone = tuple(trial for trial in experiment.trials if trial.controller == "safe")
+    path = write_report(tmp_path, [replace(experiment, trials=alone, recordings=())], {})
+    page = path.read_text(encoding="utf-8")
+    assert Page(page).faults == []
+    assert "one controller" in page
+    assert "data-film=" not in page.split("<script>")[1]
+
+
+def test_nothing_measured(tmp_path):
+    assert Page(write_report(tmp_path, [], {}).read_text(encoding="utf-8")).faults == []
