@@ -16,7 +16,6 @@ class Aim:
         above: smallest value allowed, in the row's unit.
         share: largest multiple of the baseline's median allowed.
         at_least_share: smallest multiple of the baseline's median allowed.
-        where_baseline_above: the aim holds only where the baseline's median is greater, in the row's unit.
         worst: judge the largest value over seeds.
         scenarios: words of which one must stand in the scenario's name; empty for all.
     """
@@ -25,7 +24,6 @@ class Aim:
     above: float | None = None
     share: float | None = None
     at_least_share: float | None = None
-    where_baseline_above: float | None = None
     worst: bool = False
     scenarios: tuple[str, ...] = ()
 
@@ -40,16 +38,11 @@ class Aim:
             parts.append(f"at most {_fraction(self.share)} of {BASELINE}")
         if self.at_least_share is not None:
             parts.append(f"at least {_fraction(self.at_least_share)} of {BASELINE}")
-        if self.where_baseline_above is not None:
-            parts.append(f"where {BASELINE} passes {self.where_baseline_above:g}")
         return " ".join(parts)
 
     def judge(self, value: Spread | None, baseline: Spread | None, scale: float) -> bool | None:
         """Tell whether a figure reaches the aim; None where that cannot be said."""
         if value is None or value.n == 0:
-            return None
-        limit = self.where_baseline_above
-        if limit is not None and (baseline is None or not scale * baseline.median > limit):
             return None
         found = scale * (value.max if self.worst else value.median)
         of_baseline = ratio(value, baseline)
@@ -111,7 +104,7 @@ class Line:
 
 TITLES = {"task-safety": "Task safety", "joint-safety": "Joint safety", "disturbance": "Disturbance"}
 
-_PUSHED = Aim(below=10.0, where_baseline_above=25.0, scenarios=("link 4", "link 5"))
+_PUSHED = Aim(below=10.0, scenarios=("link 4", "link 5"))
 
 CATALOGUE: dict[str, tuple[Row, ...]] = {
     "task-safety": (
@@ -127,7 +120,7 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("impulse_ns", "impulse of the contact", "N s"),
         Row(
             "tau_steady_nm", "external joint torque, steady", "N m", main=True,
-            aim=Aim(below=5.0, where_baseline_above=8.0),
+            aim=Aim(below=5.0),
         ),
         Row("tau_peak_nm", "external joint torque, peak", "N m"),
         Row("residual_steady_nm", "observer's residual, steady", "N m"),
