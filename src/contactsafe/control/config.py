@@ -22,12 +22,14 @@ class ControllerConfig:
         residual_cutoff_hz: low-pass behind both residuals, Hz; inf for none.
         residual_threshold: δ, N m.
         dwell_s: t_c, least time in contact mode, s.
+        release_s: time the residual must have stayed below δ before contact mode ends, s.
+        recover_s: time constant with which posture stiffness comes back after contact, s; 0 for at once.
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
         contact_damping: damping of every joint while in contact, N m s/rad.
+        approach_damping: damping along the contact's direction of motion into it, while yielding, N m s/rad.
         push_yield_nm: largest commanded push along the contact while the arm is what ran into something, N m; inf for none.
         push_hold_nm: the same while something pushes the arm, N m; inf for none.
-        work_memory_s: time over which work exchanged with the contact is remembered, s.
-        work_hold_j: net work received from the contact that tells a pusher from an obstacle, J.
+        work_hold_j: net work received since contact that tells a pusher from an obstacle, J.
         hold_rise: the arm yields again when, doing the work itself, it meets this many times the torque of the pusher.
         friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
         stiffness_range: allowed K_task, 1/s².
@@ -50,12 +52,14 @@ class ControllerConfig:
     residual_cutoff_hz: float = 30.0
     residual_threshold: float = 1.5
     dwell_s: float = 0.05
+    release_s: float = 0.0
+    recover_s: float = 0.0
     null_damping: float = 0.0
     contact_damping: float = 0.0
+    approach_damping: float = 0.0
     push_yield_nm: float = math.inf
     push_hold_nm: float = math.inf
-    work_memory_s: float = 0.3
-    work_hold_j: float = 0.02
+    work_hold_j: float = 0.01
     hold_rise: float = 1.5
     friction_compensation: bool = True
     stiffness_range: tuple[float, float] = (10.0, 1500.0)
@@ -80,7 +84,7 @@ class ControllerConfig:
                 raise InvalidInputError(
                     f"{field.name} = {getattr(self, field.name)} has a negative number or NaN; give numbers ≥ 0"
                 )
-        for name in ("dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "work_memory_s", "joint_margin"):
+        for name in ("dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin"):
             if getattr(self, name) <= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)} must be greater than 0")
         for name in ("stiffness_range", "damping_range"):

@@ -26,20 +26,24 @@ def vices() -> ControllerConfig:
 
 
 def safe() -> ControllerConfig:
-    """Give the default: `paper()` with null-space damping, a fast trigger and a bounded push.
+    """Give the default: `paper()` with a fast trigger, damping where the paper leaves none, and a bounded push.
 
-    A fast residual triggers and compensates; damping stays in the null-space direction that the contact removes; and
-    the command never pushes along the contact harder than a bound, low where the arm ran into something, higher where
-    something pushes the arm.
+    A fast residual triggers and compensates; damping stays in the null-space direction that the contact removes, and in
+    every joint; motion into the contact is braked; and the command never pushes along the contact harder than a bound,
+    low where the arm ran into something, higher where something pushes the arm. Contact mode ends, and the posture's
+    stiffness comes back, slowly, so that there is no second blow.
     """
     return replace(
         paper(),
         observer_gain=50.0,
-        trigger_gain=50.0,
-        residual_cutoff_hz=100.0,
+        trigger_gain=100.0,
+        residual_cutoff_hz=200.0,
         residual_threshold=2.0,
-        null_damping=3.0,
-        contact_damping=2.0,
+        release_s=1.0,
+        recover_s=1.0,
+        null_damping=10.0,
+        contact_damping=5.0,
+        approach_damping=150.0,
         push_yield_nm=3.0,
         push_hold_nm=22.0,
     )

@@ -57,13 +57,13 @@ def params_dtype(n: int) -> np.dtype:
     """Describe a configuration resolved for one arm: per-joint arrays, per-tick factors."""
     scalars = (
         "trigger_share", "observer_share", "lowpass_share", "residual_threshold", "null_damping", "contact_damping",
-        "push_yield_nm", "push_hold_nm", "work_keep", "work_hold_j", "hold_rise",
-        "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin", "joint_stop_stiffness",
+        "push_yield_nm", "push_hold_nm", "work_hold_j", "hold_rise", "approach_damping",
+        "recover_share", "recover_from", "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin", "joint_stop_stiffness",
         "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step", "dt",
     )  # fmt: skip
     return np.dtype(
         [(name, _f) for name in scalars]
-        + [(name, _i) for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks")]
+        + [(name, _i) for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks", "release_ticks")]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
         + [("friction", _f, (n, 3))]
     )
@@ -85,7 +85,10 @@ def state_dtype(n: int) -> np.dtype:
             ("target", target_dtype(n)),  # last good target
             ("mode", _i),
             ("mode_ticks", _i),  # ticks spent in the mode
-            ("work_j", _f),  # net work received from the contact, fading, J
+            ("work_j", _f),  # net work received from the contact since it was found, J
+            ("quiet_ticks", _i),  # ticks since the residual was above the threshold
+            ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
+            ("posture_share", _f),  # of K_pose in force
             ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
             ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
             ("holding", _i),  # 1 while something pushes the arm
@@ -139,7 +142,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     dt = config.dt
     for name in (
         "residual_threshold", "null_damping", "contact_damping", "push_yield_nm", "push_hold_nm", "work_hold_j",
-        "hold_rise", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
+        "hold_rise", "approach_damping", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
         "manipulability_floor", "manipulability_damping", "dt", "contact_aware", "cancel_tool_wrench",
         "friction_compensation",
     ):  # fmt: skip
@@ -147,11 +150,13 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["trigger_share"] = 1.0 - math.exp(-config.trigger_gain * dt)
     params["observer_share"] = 1.0 - math.exp(-config.observer_gain * dt)
     params["lowpass_share"] = 1.0 - math.exp(-2.0 * math.pi * config.residual_cutoff_hz * dt)
-    params["work_keep"] = math.exp(-dt / config.work_memory_s)
     params["stiffness_min"], params["stiffness_max"] = config.stiffness_range
     params["damping_min"], params["damping_max"] = config.damping_range
     params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt
     params["dwell_ticks"] = round(config.dwell_s / dt)
+    params["release_ticks"] = round(config.release_s / dt)
+    params["recover_share"] = 1.0 - math.exp(-dt / config.recover_s) if config.recover_s > 0 else 1.0
+    params["recover_from"] = 0.0 if config.recover_s > 0 else 1.0
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
     params["D_pose"] = _per_joint(config.D_pose, arm.n)
     params["q_min"], params["q_max"] = arm.q_min, arm.q_max

@@ -125,6 +125,7 @@ def _start(c):
     """Begin at rest: momentum as measured, command at gravity, so that nothing jumps."""
     state, dynamics = c.state, c.dynamics
     state.started = 1
+    state.posture_share = 1.0
     state.momentum[:] = momentum(dynamics.M, c.measurement.qd)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
@@ -166,15 +167,21 @@ def _link_in_contact(residual, threshold):
 
 @njit(cache=True)
 def _supervise(c):
-    """Choose the mode, with dwell; while in contact, tell what pushes the arm from what it ran into."""
+    """Choose the mode, with dwell and release; remember the contact's direction; tell pusher from obstacle."""
     state, params = c.state, c.params
     link = _link_in_contact(state.residual_trigger, params.residual_threshold)
     state.mode_ticks += 1
+    state.quiet_ticks = 0 if link != 0 else state.quiet_ticks + 1
     if state.mode == FREE:
+        state.posture_share += params.recover_share * (1.0 - state.posture_share)
         if link != 0 and params.contact_aware != 0:
             _enter(state, CONTACT)
-    elif link == 0 and state.mode_ticks >= params.dwell_ticks:
+    elif state.mode_ticks >= params.dwell_ticks and state.quiet_ticks > params.release_ticks:
         _enter(state, FREE)
+    if state.mode == CONTACT:
+        state.posture_share = params.recover_from
+        if link != 0:
+            state.direction[:] = state.residual_trigger / math.sqrt(dot(state.residual_trigger, state.residual_trigger))
     _watch_work(c)
     c.output.link = link
 
@@ -200,7 +207,7 @@ def _watch_work(c):
         return
     power = dot(state.residual_trigger, state.velocity_seen)
     size = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
-    state.work_j = params.work_keep * state.work_j + power * params.dt
+    state.work_j += power * params.dt
     if state.holding == 0:
         if state.work_j > params.work_hold_j:
             state.holding, state.held_nm = 1, size
@@ -222,7 +229,7 @@ def _law(c):
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     F = impedance_wrench(Lambda, error, dynamics.velocity, dynamics.Jdot_qd, target.K_task, target.D_task)
     N_t = task_nullspace(dynamics.J, J_bar)
-    tau_pose = posture_torque(target.q_pose, q, qd, params.K_pose, params.D_pose)
+    tau_pose = posture_torque(target.q_pose, q, qd, state.posture_share * params.K_pose, params.D_pose)
     c.output.error[:] = error
     c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
     if state.mode == FREE:
@@ -234,22 +241,26 @@ def _law(c):
 
 @njit(cache=True)
 def _contact_law(c, F, J_bar, N_t, tau_pose):
-    """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, damped in the direction taken out, and never pushing beyond the bound."""
+    """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
+
+    Damping stays in the null-space direction that the contact takes out and in all joints; motion into the contact is
+    braked along its direction; and the command never pushes along it harder than the bound in force.
+    """
     state, dynamics, params = c.state, c.dynamics, c.params
-    qd = c.measurement.qd
+    qd, direction = c.measurement.qd, c.state.direction
     F_tc = F - matvec_t(J_bar, state.residual)
-    N_ct = contact_nullspace(N_t, dynamics.M_inv, state.residual)
+    N_ct = contact_nullspace(N_t, dynamics.M_inv, direction)
     tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
     tau -= params.null_damping * matvec_t(N_t - N_ct, qd)
     tau -= params.contact_damping * qd
     limit = params.push_hold_nm if state.holding != 0 else params.push_yield_nm
-    norm = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
-    if norm > 0.0:
-        direction = state.residual_trigger / norm
-        push = push_along(direction, dynamics.M_inv, tau)
-        c.output.push_nm, c.output.push_limit_nm = push, limit
-        if push > limit:
-            tau += (push - limit) * direction
+    push = push_along(direction, dynamics.M_inv, tau)
+    if push > limit:
+        tau += (push - limit) * direction
+    if state.holding == 0:
+        # After the bound, or the task would use up what the brake frees.
+        tau += params.approach_damping * max(-dot(direction, qd), 0.0) * direction
+    c.output.push_nm, c.output.push_limit_nm = push, limit
     return tau
 
 

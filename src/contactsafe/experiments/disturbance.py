@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from contactsafe.envs.config import WipingConfig
+from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
@@ -18,6 +18,9 @@ PUSH_POINTS = {4: (0.0, 0.0, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
 """Where each link is pushed: elbow, middle of the forearm, wrist; in the link's frame, m."""
 
 MODES = ("holding", "wiping")
+STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
+"""K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
+
 _HOLD_HEIGHT = 0.06  # m above the board
 _PRESS = 0.004  # depth of x_d below the board while wiping, m
 _STROKE, _PERIOD_S = 0.08, 4.0  # half length, m, and period, s, of the strokes
@@ -58,7 +61,8 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
-    tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), seeds[0])
+    config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS))
+    tasks = WipingTasks(config, len(seeds), seeds[0])
     x, y, z = tasks.config.world.board.centre
     start = np.array([x, y, z + _HOLD_HEIGHT])
     if mode == "wiping":
