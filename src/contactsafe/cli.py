@@ -129,7 +129,9 @@ def evaluate(
     if seed < 0:
         raise InvalidInputError(f"seed = {seed}; give 0 or more")
     loaded = Bundle.load(bundle or shipped_bundle())
-    env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=min(16, episodes), config=WipingConfig(controller=controller))
+    env = gymnasium.make_vec(
+        "contactsafe/Wiping-v0", num_envs=min(16, episodes), config=WipingConfig(controller=controller)
+    )
     policy = Policy(loaded, env.unwrapped.camera_homography)
     with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
         results = evaluate_policy(policy, env, episodes, seed, on_episode=lambda record: bar.update())

@@ -26,10 +26,11 @@ class ControllerConfig:
         recover_s: time constant with which posture stiffness comes back after contact, s; 0 for at once.
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
         contact_damping: damping of every joint while in contact, N m s/rad.
-        approach_damping: damping along the contact's direction of motion into it, while yielding, N m s/rad.
+        approach_damping: damping along the contact's direction, of motion into an obstacle and of being carried along by a
+            pusher, N m s/rad.
         push_yield_nm: largest commanded push along the contact while the arm is what ran into something, N m; inf for none.
         push_hold_nm: the same while something pushes the arm, N m; inf for none.
-        work_hold_j: net work received since contact that tells a pusher from an obstacle, J.
+        work_hold_j: work received beyond what an elastic obstacle could give back that tells a pusher, J.
         hold_rise: the arm yields again when, doing the work itself, it meets this many times the torque of the pusher.
         friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
         stiffness_range: allowed K_task, 1/s².
@@ -59,7 +60,7 @@ class ControllerConfig:
     approach_damping: float = 0.0
     push_yield_nm: float = math.inf
     push_hold_nm: float = math.inf
-    work_hold_j: float = 0.01
+    work_hold_j: float = 0.005
     hold_rise: float = 1.5
     friction_compensation: bool = True
     stiffness_range: tuple[float, float] = (10.0, 1500.0)

@@ -154,7 +154,9 @@ class Controller:
             UnreachableError: no posture was given and none reaches the pose.
         """
         if not self._is_reset:
-            raise InvalidInputError("the controller was not reset; call reset(q) with the measured joint positions first")
+            raise InvalidInputError(
+                "the controller was not reset; call reset(q) with the measured joint positions first"
+            )
         if target is not self._last_target:
             self.set_target(target)
             self._last_target = target

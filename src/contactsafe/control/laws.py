@@ -7,13 +7,13 @@ signs follow `M q̈ + c + g = tau_m + tau_ext`, tau_ext being what the environme
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t, spd_inverse
 from contactsafe.robot.rotation import orientation_error
 
 
-@njit(cache=True)
+@compiled
 def task_inertia(J, M_inv, manipulability_floor, damping_max):
     """Give Λ = (J M⁻¹ Jᵀ)⁻¹, damped where the arm loses a direction.
 
@@ -41,7 +41,7 @@ def task_inertia(J, M_inv, manipulability_floor, damping_max):
     return Lambda, J_M_inv
 
 
-@njit(cache=True)
+@compiled
 def _determinant(A):
     """Determinant of a symmetric positive semi-definite matrix, by Cholesky's pivots; 0 where one is not positive."""
     n = A.shape[0]
@@ -59,7 +59,7 @@ def _determinant(A):
     return det
 
 
-@njit(cache=True)
+@compiled
 def impedance_wrench(Lambda, error, velocity, Jdot_qd, K_task, D_task):
     """Give F_t without gravity and Coriolis terms, (4): Λ (K e − D ẋ − J̇ q̇).
 
@@ -80,7 +80,7 @@ def impedance_wrench(Lambda, error, velocity, Jdot_qd, K_task, D_task):
     return matvec(Lambda, acceleration)
 
 
-@njit(cache=True)
+@compiled
 def task_error(position_d, quat_d, position, rotation):
     """Give x_d − x: position difference, then rotation vector of R_d Rᵀ, world axes, (6,), m and rad."""
     error = np.empty(6)
@@ -91,7 +91,7 @@ def task_error(position_d, quat_d, position, rotation):
     return error
 
 
-@njit(cache=True)
+@compiled
 def posture_torque(q_pose, q, qd, K_pose, D_pose):
     """Give Γ_pose = K2 (q_pose − q) − D2 q̇, (15), (n,), N m."""
     out = np.empty(q.shape[0])
@@ -100,7 +100,7 @@ def posture_torque(q_pose, q, qd, K_pose, D_pose):
     return out
 
 
-@njit(cache=True)
+@compiled
 def task_nullspace(J, J_bar):
     """Give N_t = I − J# J, (16), (n, n); J_bar is the dynamically consistent inverse M⁻¹ Jᵀ Λ, (n, 6)."""
     N = matmul(J_bar, J)
@@ -111,7 +111,7 @@ def task_nullspace(J, J_bar):
     return N
 
 
-@njit(cache=True)
+@compiled
 def contact_nullspace(N_t, M_inv, residual):
     """Remove the contact direction from the task null space.
 
@@ -139,7 +139,7 @@ def contact_nullspace(N_t, M_inv, residual):
     return N_ct
 
 
-@njit(cache=True)
+@compiled
 def push_along(direction, M_inv, tau_net):
     """Give the torque with which a command pushes against a contact, N m.
 
@@ -154,19 +154,41 @@ def push_along(direction, M_inv, tau_net):
     return -dot(M_inv_a, tau_net) / dot(direction, M_inv_a)
 
 
-@njit(cache=True)
+@compiled
+def is_pushed(work, work_least, torque, torque_peak, margin):
+    """Tell something that pushes the arm from something the arm ran into, by what it gives back.
+
+    An elastic contact into which the arm put the work W, and whose torque has since fallen from its peak, has given back
+    W (1 − (torque/peak)²) at the most, whatever its stiffness; a lossy one less. More than that comes from a pusher. A
+    share of W is allowed on top: springs are not quite linear, nor lever arms constant.
+
+    Args:
+        work: net work received from the contact since it was found, J.
+        work_least: the least value it has had, −W, J.
+        torque: size of the contact torque, N m.
+        torque_peak: largest it has been, N m.
+        margin: J.
+    """
+    if torque_peak <= 0.0:
+        return False
+    given_back = work - work_least
+    elastic = -work_least * (1.15 - (torque / torque_peak) ** 2)
+    return given_back > elastic + margin
+
+
+@compiled
 def momentum(M, qd):
     """Give p = M q̇, (10), (n,), kg m²/s."""
     return matvec(M, qd)
 
 
-@njit(cache=True)
+@compiled
 def observer_gain(gain, dt):
     """Give 1 − exp(−K dt), the share of a step that a first-order observer of gain K (1/s) takes up in one tick."""
     return 1.0 - math.exp(-gain * dt)
 
 
-@njit(cache=True)
+@compiled
 def observer_step(residual, share, tau_external):
     """Advance the momentum observer in place by one tick, (12)-(14).
 
@@ -183,7 +205,7 @@ def observer_step(residual, share, tau_external):
         residual[i] += share * (tau_external[i] - residual[i])
 
 
-@njit(cache=True)
+@compiled
 def joint_stop_torque(q, qd, q_min, q_max, margin, stiffness, damping):
     """Push joints back that come within a margin of their range: a one-sided spring and damper.
 
@@ -208,7 +230,7 @@ def joint_stop_torque(q, qd, q_min, q_max, margin, stiffness, damping):
     return out
 
 
-@njit(cache=True)
+@compiled
 def limit_torque(tau, tau_previous, tau_max, step_max):
     """Clip a command in place to the torque limits and to a largest change per tick.
 

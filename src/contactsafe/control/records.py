@@ -63,7 +63,10 @@ def params_dtype(n: int) -> np.dtype:
     )  # fmt: skip
     return np.dtype(
         [(name, _f) for name in scalars]
-        + [(name, _i) for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks", "release_ticks")]
+        + [
+            (name, _i)
+            for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks", "release_ticks")
+        ]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
         + [("friction", _f, (n, 3))]
     )
@@ -92,7 +95,8 @@ def state_dtype(n: int) -> np.dtype:
             ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
             ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
             ("holding", _i),  # 1 while something pushes the arm
-            ("held_nm", _f),  # largest |residual| shown by what pushes, N m
+            ("work_least_j", _f),  # least value of work_j, J
+            ("peak_nm", _f),  # largest |residual_trigger| since contact, or since holding began, N m
             ("fault", _i),  # first fault since reset
             ("bad_ticks", _i),  # unusable measurements in a row
         ]

@@ -3,11 +3,12 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.control.laws import (
     contact_nullspace,
     impedance_wrench,
+    is_pushed,
     joint_stop_torque,
     limit_torque,
     momentum,
@@ -26,8 +27,11 @@ from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 _LOST_AFTER_TICKS = 20
 
+_SETTLED = 0.85
+"""A torque has stopped rising when the slower residual has come this near to the faster one."""
 
-@njit(cache=True, nogil=True)
+
+@compiled(nogil=True)
 def control_tick(c):
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
@@ -48,13 +52,13 @@ def control_tick(c):
     _finish(c, tau)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def tick_at(controllers, i):
     """Run `control_tick` on one of an array of records: from Python an array is handed over far faster than a record."""
     control_tick(controllers[i])
 
 
-@njit(cache=True)
+@compiled
 def _all_finite(x):
     for i in range(x.shape[0]):
         if not math.isfinite(x[i]):
@@ -62,19 +66,19 @@ def _all_finite(x):
     return True
 
 
-@njit(cache=True)
+@compiled
 def _measurement_is_finite(m):
     wrench_ok = m.has_wrench == 0 or _all_finite(m.wrench_ee)
     return wrench_ok and _all_finite(m.q) and _all_finite(m.qd)
 
 
-@njit(cache=True)
+@compiled
 def _latch(state, fault):
     if state.fault == 0:
         state.fault = fault
 
 
-@njit(cache=True)
+@compiled
 def _tick_without_measurement(c):
     """Repeat the last torque, as the robot itself does for a lost packet; after 20 ticks fall back to gravity."""
     state = c.state
@@ -89,7 +93,7 @@ def _tick_without_measurement(c):
     c.output.fault = state.fault
 
 
-@njit(cache=True)
+@compiled
 def _target_fault(target, params):
     finite = _all_finite(target.position) and _all_finite(target.quat) and _all_finite(target.q_pose)
     if not (finite and _all_finite(target.K_task) and _all_finite(target.D_task)):
@@ -103,7 +107,7 @@ def _target_fault(target, params):
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _accept_target(c):
     """Take the target over where it is sound; latch the reason where it is not."""
     fault = _target_fault(c.target, c.params)
@@ -120,7 +124,7 @@ def _accept_target(c):
     held.q_pose[:] = c.target.q_pose
 
 
-@njit(cache=True)
+@compiled
 def _start(c):
     """Begin at rest: momentum as measured, command at gravity, so that nothing jumps."""
     state, dynamics = c.state, c.dynamics
@@ -133,7 +137,7 @@ def _start(c):
         state.tau[i] = state.beta[i]
 
 
-@njit(cache=True)
+@compiled
 def _observe(c):
     """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14)."""
     state, dynamics, params = c.state, c.dynamics, c.params
@@ -156,7 +160,7 @@ def _observe(c):
     observer_step(state.residual_trigger, params.lowpass_share, state.observed_trigger)
 
 
-@njit(cache=True)
+@compiled
 def _link_in_contact(residual, threshold):
     """Give the furthest joint from the base whose residual exceeds the threshold, 1 … n; 0 for none."""
     for i in range(residual.shape[0] - 1, -1, -1):
@@ -165,7 +169,7 @@ def _link_in_contact(residual, threshold):
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _supervise(c):
     """Choose the mode, with dwell and release; remember the contact's direction; tell pusher from obstacle."""
     state, params = c.state, c.params
@@ -186,19 +190,17 @@ def _supervise(c):
     c.output.link = link
 
 
-@njit(cache=True)
+@compiled
 def _enter(state, mode):
     state.mode, state.mode_ticks = mode, 0
-    state.work_j, state.holding, state.held_nm = 0.0, 0, 0.0
+    state.work_j, state.work_least_j, state.peak_nm, state.holding = 0.0, 0.0, 0.0, 0
 
 
-@njit(cache=True)
+@compiled
 def _watch_work(c):
     """Decide between holding and yielding by the work exchanged with the contact.
 
-    Something passive never gives back more than was put into it: only a pusher brings the net work above zero. Once
-    holding, the arm yields again where the torque rises well above what the pusher showed while the arm does the work:
-    that is running into something. Torque and velocity pass the same filters, or the torque's lag would look like work.
+    Torque and velocity pass the same filters, or the torque's lag would look like work.
     """
     state, params = c.state, c.params
     observer_step(state.velocity_observed, params.trigger_share, c.measurement.qd)
@@ -208,16 +210,20 @@ def _watch_work(c):
     power = dot(state.residual_trigger, state.velocity_seen)
     size = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
     state.work_j += power * params.dt
+    state.work_least_j = min(state.work_least_j, state.work_j)
     if state.holding == 0:
-        if state.work_j > params.work_hold_j:
-            state.holding, state.held_nm = 1, size
+        state.peak_nm = max(state.peak_nm, size)
+        settled = math.sqrt(dot(state.residual, state.residual)) > _SETTLED * size
+        if settled and is_pushed(state.work_j, state.work_least_j, size, state.peak_nm, params.work_hold_j):
+            state.holding, state.peak_nm = 1, size
     elif power >= 0.0:
-        state.held_nm = max(state.held_nm, size)
-    elif size > params.hold_rise * state.held_nm:
-        state.holding, state.work_j = 0, 0.0
+        state.peak_nm = max(state.peak_nm, size)
+    elif size > params.hold_rise * state.peak_nm:
+        # The torque rises well above what the pusher showed, while the arm does the work: that is running into something.
+        state.holding, state.work_j, state.work_least_j = 0, 0.0, 0.0
 
 
-@njit(cache=True)
+@compiled
 def _law(c):
     """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m."""
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
@@ -239,12 +245,13 @@ def _law(c):
     return tau_net + dynamics.c + dynamics.g
 
 
-@njit(cache=True)
+@compiled
 def _contact_law(c, F, J_bar, N_t, tau_pose):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
-    Damping stays in the null-space direction that the contact takes out and in all joints; motion into the contact is
-    braked along its direction; and the command never pushes along it harder than the bound in force.
+    Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
+    braked along the contact's direction, and so is being carried along by a pusher; and the command never pushes along
+    it harder than the bound in force.
     """
     state, dynamics, params = c.state, c.dynamics, c.params
     qd, direction = c.measurement.qd, c.state.direction
@@ -253,18 +260,22 @@ def _contact_law(c, F, J_bar, N_t, tau_pose):
     tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
     tau -= params.null_damping * matvec_t(N_t - N_ct, qd)
     tau -= params.contact_damping * qd
-    limit = params.push_hold_nm if state.holding != 0 else params.push_yield_nm
+    speed = dot(direction, qd)
+    limit = params.push_yield_nm
+    if state.holding != 0:
+        limit = params.push_hold_nm
+        tau -= params.approach_damping * max(speed, 0.0) * direction
     push = push_along(direction, dynamics.M_inv, tau)
     if push > limit:
         tau += (push - limit) * direction
     if state.holding == 0:
         # After the bound, or the task would use up what the brake frees.
-        tau += params.approach_damping * max(-dot(direction, qd), 0.0) * direction
+        tau -= params.approach_damping * min(speed, 0.0) * direction
     c.output.push_nm, c.output.push_limit_nm = push, limit
     return tau
 
 
-@njit(cache=True)
+@compiled
 def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.envs.config import ActionConfig
 from contactsafe.robot.ik import solve_ik
 from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
@@ -58,13 +58,13 @@ def action_limits(config: ActionConfig, board: BoardConfig) -> ActionLimits:
     )
 
 
-@njit(cache=True)
+@compiled
 def rotation_from_down(quat):
     """Give the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
     return quat_to_rotvec(quat_multiply(quat, _UNDO_DOWN))
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def apply_action(c, limits, q_min, q_max, action):
     """Move the target of a `controller_dtype` record by one action.
 
@@ -99,7 +99,7 @@ def apply_action(c, limits, q_min, q_max, action):
         target.q_pose[:] = q_pose
 
 
-@njit(cache=True)
+@compiled
 def observed_pose(c, out):
     """Fill tool position, m, and rotation vector from straight down, rad, as measured, (6,)."""
     rotvec = rotation_from_down(matrix_to_quat(c.output.rotation))

@@ -8,8 +8,8 @@ the camera's own frame it hardly does.
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError
 
 INK_BELOW = 128
@@ -76,13 +76,13 @@ def rectify(masks, tool_positions, homography, window_m=WINDOW_M, size=SIZE):
     return views
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _rectify(masks, tool_xy, homography, inverse, window_m, views):
     for n in range(masks.shape[0]):
         _rectify_one(masks[n], tool_xy[n, 0], tool_xy[n, 1], homography, inverse, window_m, views[n])
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _rectify_one(mask, tool_x, tool_y, H, H_inv, window_m, view):
     size = view.shape[0]
     view[:, :] = 255
@@ -116,12 +116,12 @@ def _rectify_one(mask, tool_x, tool_y, H, H_inv, window_m, view):
     _look_up(mask, first_row, last_row, first_column, last_column, H, side, x0, y0, per_m, view)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _clamp(value, size):
     return int(min(max(value, 0.0), float(size)))
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _ink_box(mask):
     """Find rows and columns between which all ink lies, both ends included; bottom is -1 without ink."""
     top, bottom, left, right = mask.shape[0], -1, mask.shape[1], -1
@@ -140,7 +140,7 @@ def _ink_box(mask):
     return top, bottom, left, right
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _splat(mask, top, bottom, left, right, H_inv, side, x0, y0, per_m, view):
     """Mark the cell that holds the centre of each ink pixel."""
     size = view.shape[0]
@@ -157,7 +157,7 @@ def _splat(mask, top, bottom, left, right, H_inv, side, x0, y0, per_m, view):
                         view[int(row), int(column)] = 0
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _look_up(mask, first_row, last_row, first_column, last_column, H, side, x0, y0, per_m, view):
     """Mark each cell whose centre the camera sees as ink."""
     height, width = mask.shape

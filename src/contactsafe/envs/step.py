@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose
 from contactsafe.sim.camera import render_mask
 from contactsafe.sim.stepping import run_ticks
@@ -31,12 +31,10 @@ task_dtype = np.dtype(
 )
 """What the task knows of one world."""
 
-rewards_dtype = np.dtype(
-    [(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_share")]
-)
+rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_share")])
 
 
-@njit(cache=True)
+@compiled
 def nearest_ink(cells, origin, cell, position):
     """Count the ink and find how far the nearest of it lies from a point along the board.
 
@@ -63,7 +61,7 @@ def nearest_ink(cells, origin, cell, position):
     return count, math.sqrt(best) * cell
 
 
-@njit(cache=True)
+@compiled
 def score(task, report, rewards, ink, distance):
     """Fill the reward's terms of one step, and the step's ends.
 
@@ -86,7 +84,7 @@ def score(task, report, rewards, ink, distance):
     task.ink, task.distance = ink, distance
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def step_tasks(
     start, stop, plants, controllers, cells, noise, ticks, reports, traces, camera, limits, q_min, q_max, actions,
     rewards, tasks, masks,
@@ -101,7 +99,7 @@ def step_tasks(
         observe(plants[i], controllers[i], cells[i], camera, tasks[i], masks[i])
 
 
-@njit(cache=True)
+@compiled
 def observe(plant, controller, cells, camera, task, mask):
     """Fill what the policy sees: the tool's pose and the camera's mask."""
     observed_pose(controller, task.pose)

@@ -92,9 +92,7 @@ class WipingTasks:
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
         worlds = self.worlds
-        observe(
-            worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i]
-        )
+        observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i])
 
     def posture_over(self, pose: Pose) -> np.ndarray:
         """Find joint positions for a tool pose, near those over the board's centre, (n,), rad."""

@@ -104,7 +104,9 @@ class WipingVectorEnv(gymnasium.vector.VectorEnv):
     def reset(self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None):
         """Begin an episode in every task; a number seeds environment i with seed + i."""
         if seed is not None or not self._rngs:
-            seeds = seed if isinstance(seed, list) else [None if seed is None else seed + i for i in range(self.num_envs)]
+            seeds = (
+                seed if isinstance(seed, list) else [None if seed is None else seed + i for i in range(self.num_envs)]
+            )
             if len(seeds) != self.num_envs:
                 raise InvalidInputError(f"{len(seeds)} seeds for {self.num_envs} environments; give one each")
             self._rngs = [np.random.default_rng(s) for s in seeds]

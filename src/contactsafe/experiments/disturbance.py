@@ -10,12 +10,14 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Act, Progress, Run, holding, run_policy
 
-QUESTION = "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes: how far does the tool stray?"
+QUESTION = (
+    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes: how far does the tool stray?"
+)
 PUSH_N = 25.0
 PUSH_S = (0.5, 2.0)
 DURATION_S = 2.5
-PUSH_POINTS = {4: (0.0, 0.0, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
-"""Where each link is pushed: elbow, middle of the forearm, wrist; in the link's frame, m."""
+PUSH_POINTS = {4: (-0.0825, 0.12, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
+"""Where each link is pushed: end of the forearm near the elbow, its middle, the wrist; in the link's frame, m."""
 
 MODES = ("holding", "wiping")
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)

@@ -44,9 +44,7 @@ def joint_safety(bundle, config: ExperimentConfig, progress: Progress | None = N
         for name in config.controllers:
             for seeds in config.batches():
                 tasks, run = _collide(bundle, make, name, seeds)
-                trials += [
-                    Trial(scenario, name, seed, contact_metrics(run.traces[i])) for i, seed in enumerate(seeds)
-                ]
+                trials += [Trial(scenario, name, seed, contact_metrics(run.traces[i])) for i, seed in enumerate(seeds)]
                 if config.seed in seeds:
                     obstacle = tasks.worlds.configs[0].obstacles[0]
                     shape = (obstacle.radius, obstacle.half_length)

@@ -96,7 +96,8 @@ class Experiment:
         """Give question, spreads and trials as plain values for JSON; what does not exist is null."""
         spreads = {
             scenario: {
-                controller: {name: _plain(asdict(value)) for name, value in row.items()} for controller, row in rows.items()
+                controller: {name: _plain(asdict(value)) for name, value in row.items()}
+                for controller, row in rows.items()
             }
             for scenario, rows in self.spreads().items()
         }

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick, tick_at
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
@@ -39,13 +39,13 @@ class Speed:
     ratio: float
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _bare_physics(model, data, n):
     for _ in range(n):
         mj_step(model, data)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _ticks(controller, n):
     for _ in range(n):
         control_tick(controller)

@@ -9,7 +9,9 @@ from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress, run_policy
 from contactsafe.learning.policy import Policy
 
-QUESTION = "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"
+QUESTION = (
+    "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"
+)
 SCENARIO = "wiping"
 _TOUCHING_N = 0.5  # pad force above which a tick counts as contact
 

@@ -6,8 +6,8 @@ not give by itself: gravity apart from Coriolis torque, Cᵀ q̇, and J̇ q̇, a
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.robot.linalg import cross_into, dot, spd_inverse
 from contactsafe.robot.native import (
     mj_comPos,
@@ -76,7 +76,7 @@ def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str) -> np.nda
     return handle
 
 
-@njit(cache=True)
+@compiled
 def _set_configuration(handle, q):
     qpos = view1(handle.qpos, q.shape[0])
     for i in range(q.shape[0]):
@@ -85,7 +85,7 @@ def _set_configuration(handle, q):
     mj_comPos(handle.model, handle.data)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def forward_kinematics(handle, q, position, rotation, J):
     """Place the arm at q (n,) and fill the tool point (3,), its axes (3, 3) and its Jacobian (6, n)."""
     _set_configuration(handle, q)
@@ -93,7 +93,7 @@ def forward_kinematics(handle, q, position, rotation, J):
     _tool_jacobian(handle, J)
 
 
-@njit(cache=True)
+@compiled
 def _tool_frame(handle, position, rotation):
     site_xpos = view2(handle.site_xpos, handle.site + 1, 3)
     site_xmat = view2(handle.site_xmat, handle.site + 1, 9)
@@ -103,12 +103,12 @@ def _tool_frame(handle, position, rotation):
             rotation[i, j] = site_xmat[handle.site, 3 * i + j]
 
 
-@njit(cache=True)
+@compiled
 def _tool_jacobian(handle, J):
     mj_jacSite(handle.model, handle.data, J[:3].ctypes, J[3:].ctypes, handle.site)
 
 
-@njit(cache=True)
+@compiled
 def _gravity(handle, n, g):
     """g_i = −axis_i · ((com of all beyond joint i − anchor_i) × their weight)."""
     subtree_com = view2(handle.subtree_com, handle.nbody, 3)
@@ -125,7 +125,7 @@ def _gravity(handle, n, g):
         g[i] = -dot(xaxis[i], torque)
 
 
-@njit(cache=True)
+@compiled
 def _inertia_times(cinert, v, out):
     """Add I v for MuJoCo's packed spatial inertia (xx yy zz xy xz yz, m·r, m) and twist v (angular first)."""
     xx, yy, zz, xy, xz, yz = cinert[0], cinert[1], cinert[2], cinert[3], cinert[4], cinert[5]
@@ -138,7 +138,7 @@ def _inertia_times(cinert, v, out):
     out[5] += mass * v[5] + ry * v[0] - rx * v[1]
 
 
-@njit(cache=True)
+@compiled
 def _coriolis_transpose(handle, n, CT_qd):
     """(Cᵀ q̇)_i = Ṡ_i · h_i: rate of the joint's motion axis times the momentum of all beyond it.
 
@@ -159,7 +159,7 @@ def _coriolis_transpose(handle, n, CT_qd):
             CT_qd[i] = s
 
 
-@njit(cache=True)
+@compiled
 def _jacobian_rate(handle, n, out):
     """J̇ q̇ of the tool: Σ Ṡ_i q̇_i is spatial acceleration at the arm's centre of mass; moved to the tool point."""
     cdof_dot = view2(handle.cdof_dot, n, 6)
@@ -184,7 +184,7 @@ def _jacobian_rate(handle, n, out):
         out[3 + k] = a[k]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def update_dynamics(handle, q, qd, out):
     """Fill a `dynamics_dtype` record for joint positions q (n,) rad and velocities qd (n,) rad/s.
 

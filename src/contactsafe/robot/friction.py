@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from contactsafe.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def joint_friction(parameters, qd):
     """Give the torque that friction takes from each joint.
 

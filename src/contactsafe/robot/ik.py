@@ -5,8 +5,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError, UnreachableError
 from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.dynamics import forward_kinematics
@@ -134,7 +134,7 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02):
     return solver
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
     """Put the tool at a pose by damped least squares from a seed.
 
@@ -178,7 +178,7 @@ def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
     return position_error, rotation_error
 
 
-@njit(cache=True)
+@compiled
 def _limited_step(J, error, q, q_min, q_max, step, free, A, A_inv):
     """Fill the step: joints that it would carry past a limit stop there, and the others make up for them."""
     n = q.shape[0]
@@ -201,7 +201,7 @@ def _limited_step(J, error, q, q_min, q_max, step, free, A, A_inv):
             return
 
 
-@njit(cache=True)
+@compiled
 def _damped_step(J, error, wanted, free, step, A, A_inv):
     """Step = wanted + Jᵀ (J Jᵀ + λ 1)⁻¹ (error − J wanted), joints that are not free left as wanted; λ = ½ |error|²."""
     n = wanted.shape[0]
@@ -223,7 +223,7 @@ def _damped_step(J, error, wanted, free, step, A, A_inv):
         step[i] = wanted[i] + free[i] * correction[i]
 
 
-@njit(cache=True)
+@compiled
 def _shorten(step):
     largest = 0.0
     for i in range(step.shape[0]):

@@ -1,10 +1,11 @@
 """Small dense algebra for the compiled tick: matrices of six or seven rows, where a LAPACK call costs more than the work."""
 
 import numpy as np
-from numba import njit
+
+from contactsafe.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def spd_inverse(A, out):
     """Invert a symmetric positive-definite matrix by Cholesky.
 
@@ -47,7 +48,7 @@ def spd_inverse(A, out):
     return True
 
 
-@njit(cache=True)
+@compiled
 def matmul(A, B):
     """Multiply two small matrices, (m, k) and (k, n)."""
     out = np.zeros((A.shape[0], B.shape[1]))
@@ -59,7 +60,7 @@ def matmul(A, B):
     return out
 
 
-@njit(cache=True)
+@compiled
 def matvec(A, x):
     """Multiply a small matrix and a vector, (m, n) and (n,)."""
     out = np.empty(A.shape[0])
@@ -71,7 +72,7 @@ def matvec(A, x):
     return out
 
 
-@njit(cache=True)
+@compiled
 def matvec_t(A, x):
     """Multiply a transposed small matrix and a vector, Aᵀ x with (m, n) and (m,)."""
     out = np.zeros(A.shape[1])
@@ -82,7 +83,7 @@ def matvec_t(A, x):
     return out
 
 
-@njit(cache=True)
+@compiled
 def dot(x, y):
     """Multiply two small vectors, (n,) and (n,)."""
     s = 0.0
@@ -91,7 +92,7 @@ def dot(x, y):
     return s
 
 
-@njit(cache=True)
+@compiled
 def cross(x, y):
     """Give x × y, (3,)."""
     out = np.empty(3)
@@ -99,7 +100,7 @@ def cross(x, y):
     return out
 
 
-@njit(cache=True)
+@compiled
 def cross_into(x, y, out):
     """Write x × y, (3,), to `out`, which is neither of them."""
     out[0] = x[1] * y[2] - x[2] * y[1]

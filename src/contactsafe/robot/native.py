@@ -9,9 +9,10 @@ import pathlib
 
 import llvmlite.binding
 import mujoco
-from numba import carray, njit, types
+from numba import carray, types
 from numba.extending import intrinsic
 
+from contactsafe.compiled import compiled
 from contactsafe.errors import UnsupportedVersionError
 
 SUPPORTED_MUJOCO = (4000000, 4001000)
@@ -69,13 +70,13 @@ def _pointer(typing_context, address):
     return types.CPointer(types.float64)(types.uintp), codegen
 
 
-@njit(inline="always")
+@compiled(inline="always")
 def view1(address, n):
     """See n float64 at an address as an array, (n,)."""
     return carray(_pointer(address), (n,))
 
 
-@njit(inline="always")
+@compiled(inline="always")
 def view2(address, rows, columns):
     """See rows × columns float64 at an address as a row-major array, (rows, columns)."""
     return carray(_pointer(address), (rows, columns))

@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from contactsafe.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def quat_to_matrix(quat):
     """Turn a unit quaternion w x y z, (4,), into a rotation matrix, (3, 3)."""
     w, x, y, z = quat[0], quat[1], quat[2], quat[3]
@@ -23,7 +24,7 @@ def quat_to_matrix(quat):
     return R
 
 
-@njit(cache=True)
+@compiled
 def matrix_to_quat(R):
     """Turn a rotation matrix, (3, 3), into a unit quaternion w x y z with w ≥ 0, (4,).
 
@@ -56,7 +57,7 @@ def matrix_to_quat(R):
     return quat
 
 
-@njit(cache=True)
+@compiled
 def quat_multiply(a, b):
     """Give the Hamilton product a b, (4,)."""
     out = np.empty(4)
@@ -67,7 +68,7 @@ def quat_multiply(a, b):
     return out
 
 
-@njit(cache=True)
+@compiled
 def quat_to_rotvec(quat):
     """Give the rotation vector of a unit quaternion, the shortest way round, (3,), rad."""
     out = np.empty(3)
@@ -81,7 +82,7 @@ def quat_to_rotvec(quat):
     return out
 
 
-@njit(cache=True)
+@compiled
 def rotvec_to_quat(rotvec):
     """Give the unit quaternion of a rotation vector, (3,) rad to (4,)."""
     out = np.empty(4)
@@ -95,7 +96,7 @@ def rotvec_to_quat(rotvec):
     return out
 
 
-@njit(cache=True)
+@compiled
 def orientation_error(quat_d, R):
     """Give the rotation vector of R_d Rᵀ in world axes, (3,), rad.
 

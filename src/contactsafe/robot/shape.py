@@ -75,9 +75,7 @@ def pad_box(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.
         InvalidInputError: the tool has no pad, or q has another shape.
     """
     if tool.pad_half_size is None:
-        raise InvalidInputError(
-            f"tool '{tool.name}' has no pad; give one that has, such as robots.WIPING_PAD"
-        )
+        raise InvalidInputError(f"tool '{tool.name}' has no pad; give one that has, such as robots.WIPING_PAD")
     origins, rotations = link_frames(facts, q)
     half = np.array(tool.pad_half_size)
     centre = np.array(tool.tcp) - (0.0, 0.0, half[2])

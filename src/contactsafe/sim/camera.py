@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
@@ -124,7 +124,7 @@ def _distance_to_plane(rays: np.ndarray, position: np.ndarray, z: float) -> np.n
     return np.where(distance > 0, distance, np.inf)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def render_mask(camera, cells, plant, out):
     """Draw a mask: ink and dark objects 0, everything else 255.
 
@@ -148,7 +148,7 @@ def render_mask(camera, cells, plant, out):
         _hide_behind(camera, camera.shapes[s, 1], camera.sizes[geom], xpos[geom], xmat[geom], out)
 
 
-@njit(cache=True)
+@compiled
 def _hide_behind(camera, is_box, size, centre, mat, out):
     """Unmark the marked pixels whose line of sight meets one shape before the board."""
     eye, focal = camera.position, camera.focal_px[0]
@@ -183,7 +183,7 @@ def _hide_behind(camera, is_box, size, centre, mat, out):
                     out[row, column] = OTHER_PIXEL
 
 
-@njit(cache=True)
+@compiled
 def _ray_meets_capsule(eye, ray, length, centre, mat, size):
     """Whether a line of sight passes within a capsule's radius of its axis: closest points of two segments."""
     radius, half = size[0], size[1]
@@ -201,7 +201,7 @@ def _ray_meets_capsule(eye, ray, length, centre, mat, size):
     return px * px + py * py + pz * pz < radius * radius
 
 
-@njit(cache=True)
+@compiled
 def _ray_meets_box(eye, ray, length, centre, mat, size):
     """Whether a line of sight enters a box: the slab test in the box's axes."""
     near, far = 0.0, length
@@ -218,5 +218,3 @@ def _ray_meets_box(eye, ray, length, centre, mat, size):
         a, b = (-size[k] - origin) / direction, (size[k] - origin) / direction
         near, far = max(near, min(a, b)), min(far, max(a, b))
     return near < far
-
-

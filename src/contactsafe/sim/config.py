@@ -129,7 +129,9 @@ class Obstacle:
     def __post_init__(self):
         """Refuse what MuJoCo would hardly feel (its contact stiffness scales with mass) or cannot build."""
         if self.mass < 0.1:
-            raise InvalidInputError(f"obstacle mass = {self.mass} kg; give 0.1 kg or more, lighter ones hardly push back")
+            raise InvalidInputError(
+                f"obstacle mass = {self.mass} kg; give 0.1 kg or more, lighter ones hardly push back"
+            )
         if self.radius <= 0 or self.stiffness <= 0:
             raise InvalidInputError(
                 f"obstacle radius = {self.radius} m, stiffness = {self.stiffness} N/m; both must be greater than 0"

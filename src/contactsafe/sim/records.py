@@ -10,7 +10,18 @@ from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig
 _f = np.float64
 _i = np.int64
 
-_VIEWED = ("ctrl", "qfrc_applied", "qfrc_constraint", "qpos", "qvel", "sensordata", "xpos", "xmat", "geom_xpos", "geom_xmat")
+_VIEWED = (
+    "ctrl",
+    "qfrc_applied",
+    "qfrc_constraint",
+    "qpos",
+    "qvel",
+    "sensordata",
+    "xpos",
+    "xmat",
+    "geom_xpos",
+    "geom_xmat",
+)
 _SENSORS = (
     "wrist_force", "wrist_torque", "wrist_accelerometer", "pad_board", "pad_table", "arm_board", "arm_table",
 )  # fmt: skip

@@ -136,9 +136,17 @@ def _sensors(root: ET.Element, arm: Arm, obstacles: int) -> None:
     ET.SubElement(sensor, "accelerometer", name="wrist_accelerometer", site="tool_com")
     if arm.tool is not None and arm.tool.pad_half_size is not None:
         ET.SubElement(
-            sensor, "contact", name="pad_board", geom1="board", geom2="pad", reduce="netforce", data="found force torque pos"
+            sensor,
+            "contact",
+            name="pad_board",
+            geom1="board",
+            geom2="pad",
+            reduce="netforce",
+            data="found force torque pos",
         )
-        ET.SubElement(sensor, "contact", name="pad_table", geom1="table", geom2="pad", reduce="netforce", data="found force")
+        ET.SubElement(
+            sensor, "contact", name="pad_table", geom1="table", geom2="pad", reduce="netforce", data="found force"
+        )
     for geom in ("board", "table"):
         ET.SubElement(
             sensor, "contact", name=f"arm_{geom}", geom1=geom, subtree2="link1", reduce="netforce", data="found force"

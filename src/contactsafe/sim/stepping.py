@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.linalg import cross, matvec, matvec_t
@@ -14,7 +14,7 @@ from contactsafe.sim.whiteboard import erase_under_pad
 _ERASE_EVERY = 8  # ticks: at 0.4 m/s the pad moves 3 mm between, a twentieth of its width
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def run_ticks(plant, controller, cells, noise, ticks, report, trace):
     """Run a number of control ticks of one world.
 
@@ -42,7 +42,7 @@ def run_ticks(plant, controller, cells, noise, ticks, report, trace):
     report.tool_force_mean /= ticks
 
 
-@njit(cache=True)
+@compiled
 def sense(plant, controller, noise):
     """Fill the controller's measurement from the plant, with noise; the only way from plant to controller."""
     measurement = controller.measurement
@@ -54,7 +54,7 @@ def sense(plant, controller, noise):
     _sense_wrench(plant, controller, noise[3 * n :])
 
 
-@njit(cache=True)
+@compiled
 def _sense_wrench(plant, controller, noise):
     """Wrist sensor with its inertial unit: what is left after the tool's weight and inertia are taken out.
 
@@ -80,7 +80,7 @@ def _sense_wrench(plant, controller, noise):
     measurement.has_wrench = 1
 
 
-@njit(cache=True)
+@compiled
 def act(plant, controller, noise):
     """Apply the command to the plant: delay, torque noise, friction, and the push that disturbs it."""
     tau = controller.output.torque
@@ -95,7 +95,7 @@ def act(plant, controller, noise):
         applied[i] = push[i] - friction[i]
 
 
-@njit(cache=True)
+@compiled
 def push_torque(plant, n):
     """Give the joint torque of the push in force at this tick, (n,), N m."""
     tau = np.zeros(n)
@@ -114,7 +114,7 @@ def push_torque(plant, n):
     return tau
 
 
-@njit(cache=True)
+@compiled
 def pad_force(plant, out):
     """Fill the force of board and table on the pad by the simulator, world axes, (3,), N."""
     data = view1(plant.sensordata, plant.nsensordata)
@@ -125,7 +125,7 @@ def pad_force(plant, out):
             out[k] = data[plant.adr_pad_board + 1 + k] + data[plant.adr_pad_table + 1 + k]
 
 
-@njit(cache=True)
+@compiled
 def obstacle_force(plant):
     """Give the largest |force| between the arm and one obstacle by the simulator, N."""
     data = view1(plant.sensordata, plant.nsensordata)
@@ -136,7 +136,7 @@ def obstacle_force(plant):
     return largest
 
 
-@njit(cache=True)
+@compiled
 def _measure(plant, controller, cells, report):
     force = np.empty(3)
     pad_force(plant, force)
@@ -159,7 +159,7 @@ def _measure(plant, controller, cells, report):
         )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _record(plant, controller, row):
     out = controller.output
     n = out.torque.shape[0]
@@ -182,7 +182,7 @@ def _record(plant, controller, row):
     row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, out.position))
 
 
-@njit(cache=True)
+@compiled
 def _pad_wrench(plant, position):
     """Wrench of the board on the pad about the tool point by the simulator, (6,)."""
     wrench = np.zeros(6)

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
 
@@ -48,7 +48,9 @@ class Whiteboard:
         """
         drawing = np.asarray(drawing)
         if drawing.ndim != 2 or drawing.shape[0] != drawing.shape[1] or drawing.shape[0] == 0:
-            raise InvalidInputError(f"drawing has shape {drawing.shape}; give a square image, (n, n), true where ink is")
+            raise InvalidInputError(
+                f"drawing has shape {drawing.shape}; give a square image, (n, n), true where ink is"
+            )
         area = self.cells[self._ink_rows, self._ink_columns]
         index = (np.arange(area.shape[0]) + 0.5) * drawing.shape[0] / area.shape[0]
         index = index.astype(int)
@@ -96,7 +98,7 @@ def _draw_stroke(drawing: np.ndarray, rng: np.random.Generator, cell: float) -> 
             heading += math.pi / 2
 
 
-@njit(cache=True)
+@compiled
 def _stamp(drawing, row, column, radius):
     """Ink the cells whose centres lie within a disc; all in cells."""
     size = drawing.shape[0]
@@ -106,7 +108,7 @@ def _stamp(drawing, row, column, radius):
                 drawing[i, j] = 1
 
 
-@njit(cache=True)
+@compiled
 def erase_under_pad(cells, origin_x, origin_y, cell, position, rotation, half_x, half_y):
     """Erase ink under a rectangular pad.
 

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype
@@ -31,7 +31,7 @@ def ticks_of_step(step: int) -> int:
     return 16 if step % 3 == 2 else 17
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def run_worlds(start, stop, plants, controllers, cells, noise, ticks, reports, traces):
     """Run ticks[i] ticks of each world from start to stop; see `run_ticks`."""
     for i in range(start, stop):

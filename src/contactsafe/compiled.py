@@ -1,0 +1,65 @@
+"""How this package compiles: numba, cached on disk under a digest of the sources.
+
+Numba's own cache looks only at the file a function stands in, so a compiled caller goes on using an old callee from
+another file after that has changed. Here every version of the sources has a cache folder of its own.
+"""
+
+import hashlib
+import os
+import pathlib
+import shutil
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+
+_KEPT_VERSIONS = 4
+
+
+def _digest() -> str:
+    """Fingerprint what compiled code depends on: our sources, numba, llvmlite, NumPy."""
+    fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    for path in sorted(pathlib.Path(__file__).parent.rglob("*.py")):
+        fingerprint.update(path.read_bytes())
+    return fingerprint.hexdigest()[:16]
+
+
+def _cache_folder() -> str:
+    """Give this version's folder, under NUMBA_CACHE_DIR or the user's cache, and forget the oldest of the others."""
+    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    root = pathlib.Path(home) / "contactsafe"
+    try:
+        folder = root / _digest()
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError
+    except OSError:
+        return tempfile.mkdtemp(prefix="contactsafe-")
+    versions = sorted((path for path in root.iterdir() if path.is_dir()), key=lambda path: -path.stat().st_mtime)
+    for old in versions[_KEPT_VERSIONS:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return str(folder)
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def compiled(function: Callable | None = None, **options: Any) -> Any:
+    """Compile a function with numba in nopython mode, cached; as `@compiled` or `@compiled(nogil=True)`.
+
+    Args:
+        function: the function; None when options are given.
+        options: of `numba.njit`.
+    """
+    if function is None:
+        return lambda decorated: compiled(decorated, **options)
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = CACHE_FOLDER
+    try:
+        return numba.njit(function, cache=True, **options)
+    finally:
+        numba.config.CACHE_DIR = before
