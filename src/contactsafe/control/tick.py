@@ -27,7 +27,7 @@ from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 _LOST_AFTER_TICKS = 20
 
-_SETTLED = 0.85
+_SETTLED = 0.75
 """A torque has stopped rising when the slower residual has come this near to the faster one."""
 
 
@@ -250,8 +250,7 @@ def _contact_law(c, F, J_bar, N_t, tau_pose):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
-    braked along the contact's direction, and so is being carried along by a pusher; and the command never pushes along
-    it harder than the bound in force.
+    braked along the contact's direction; and the command never pushes along it harder than the bound in force.
     """
     state, dynamics, params = c.state, c.dynamics, c.params
     qd, direction = c.measurement.qd, c.state.direction
@@ -260,17 +259,13 @@ def _contact_law(c, F, J_bar, N_t, tau_pose):
     tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
     tau -= params.null_damping * matvec_t(N_t - N_ct, qd)
     tau -= params.contact_damping * qd
-    speed = dot(direction, qd)
-    limit = params.push_yield_nm
-    if state.holding != 0:
-        limit = params.push_hold_nm
-        tau -= params.approach_damping * max(speed, 0.0) * direction
+    limit = params.push_hold_nm if state.holding != 0 else params.push_yield_nm
     push = push_along(direction, dynamics.M_inv, tau)
     if push > limit:
         tau += (push - limit) * direction
     if state.holding == 0:
         # After the bound, or the task would use up what the brake frees.
-        tau -= params.approach_damping * min(speed, 0.0) * direction
+        tau -= params.approach_damping * min(dot(direction, qd), 0.0) * direction
     c.output.push_nm, c.output.push_limit_nm = push, limit
     return tau
 

@@ -25,7 +25,7 @@ STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 
 _HOLD_HEIGHT = 0.06  # m above the board
 _PRESS = 0.004  # depth of x_d below the board while wiping, m
-_STROKE, _PERIOD_S = 0.08, 4.0  # half length, m, and period, s, of the strokes
+_STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
 
 
 def disturbance(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
