@@ -159,10 +159,18 @@ class Worlds:
         """Run control ticks in every world.
 
         Args:
-            ticks: at most MAX_TICKS; a number or one for each world.
-            trace: `trace_dtype` records to fill, (n, ticks); None to record nothing.
+            ticks: 1 to MAX_TICKS; a number or one for each world.
+            trace: `trace_dtype` records to fill, (n, at least ticks); None to record nothing.
+
+        Raises:
+            InvalidInputError: too many ticks, none, or a trace too short for them.
         """
         ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
+        most = int(ticks.max())
+        if ticks.min() < 1 or most > MAX_TICKS:
+            raise InvalidInputError(f"ticks = {ticks.min() if ticks.min() < 1 else most}; give 1 to {MAX_TICKS}")
+        if trace is not None and (trace.ndim != 2 or trace.shape[0] != self.n or trace.shape[1] < most):
+            raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
         noise = self.draw_noise()
         traces = self.no_trace if trace is None else trace
         self.in_threads(
