@@ -1,0 +1,133 @@
+"""What the simulator says of contacts, for rewards, metrics and tests: forces and their torques on the arm."""
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.sim.scenes import (
+    BOARD_Z, CALM, aim, contact_torque, contact_wrench, panda, posture, run, worlds_at,
+)  # fmt: skip
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.shape import arm_capsules
+from contactsafe.sim.config import NO_NOISE, Obstacle, WorldConfig, bottle, thrust_meter
+
+OVER = (0.5, 0.0, BOARD_Z + 0.05)
+RIGHT = (0.5, -0.15, BOARD_Z + 0.05)
+
+
+def beside_forearm(make, y=-0.06):
+    """Hold an obstacle where the forearm's side is when the tool is at y, m."""
+    starts, ends, radii, links = arm_capsules(panda().facts, panda().tool, posture((0.5, y, RIGHT[2]))[None])
+    k = next(k for k in np.flatnonzero(links == 5) if radii[k] > 0.05)
+    middle = (starts[0, k] + ends[0, k]) / 2
+    return make(tuple(middle - (0.0, radii[k] + make((0, 0, 0)).radius, 0.0)))
+
+
+def pressed(make, preset="vices", ticks=3000):
+    """Lead the tool to the right until the forearm leans on the obstacle."""
+    obstacle = beside_forearm(make)
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), preset)
+    aim(worlds, RIGHT)
+    return worlds, run(worlds, ticks)[0], obstacle
+
+
+@pytest.mark.parametrize("make", [bottle, thrust_meter])
+def test_at_rest_force_is_stiffness_times_displacement(make):
+    worlds, trace, obstacle = pressed(make)
+    last = trace[-1]
+    displacement = last["obstacle_position"][0] - obstacle.position
+    assert np.abs(worlds.datas[0].qvel[7:]).max() < 1e-3
+    assert last["obstacle_force"] > 20.0
+    assert_allclose(last["obstacle_force"], obstacle.stiffness * np.linalg.norm(displacement), rtol=0.02)
+    force = contact_wrench(worlds.models[0], worlds.datas[0], "obstacle0", np.zeros(3))[:3]
+    assert_allclose(force, obstacle.stiffness * displacement, rtol=0.02, atol=0.2)
+
+
+@pytest.mark.parametrize("make", [bottle, thrust_meter])
+def test_tau_arm_is_the_obstacles_contact_through_its_jacobian(make):
+    """At every stage: before, at the blow, and leaning."""
+    obstacle = beside_forearm(make)
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), "vices")
+    aim(worlds, RIGHT)
+    largest = 0.0
+    for _ in range(100):
+        row = run(worlds, 17)[0, -1]
+        true = contact_torque(worlds.models[0], worlds.datas[0], "obstacle0")
+        largest = max(largest, np.abs(true).max())
+        assert_allclose(row["tau_arm"], true, rtol=1e-6, atol=1e-9)
+    assert largest > 3.0
+
+
+def test_tau_arm_is_the_obstacles_alone_while_the_pad_presses_too():
+    obstacle = beside_forearm(bottle)
+    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.0005), WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), "vices")
+    aim(worlds, (0.5, -0.15, BOARD_Z - 0.008))
+    row = run(worlds, 2500)[0, -1]
+    assert np.linalg.norm(row["tool_force"]) > 3.0
+    assert row["obstacle_force"] > 3.0
+    true = contact_torque(worlds.models[0], worlds.datas[0], "obstacle0")
+    assert_allclose(row["tau_arm"], true, rtol=0, atol=1e-6)
+
+
+def test_the_pad_alone_is_no_contact_of_the_arm():
+    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.0005))
+    aim(worlds, (0.5, 0.06, BOARD_Z - 0.01))
+    trace = run(worlds, 1500)[0]
+    assert np.linalg.norm(trace["tool_force"], axis=1).max() > 5.0
+    assert np.abs(trace["tau_arm"]).max() < 1e-6
+
+
+def test_a_push_is_its_jacobian_transposed():
+    point, force = np.array([0.0, 0.0, -0.2]), np.array([12.0, -20.0, 5.0])
+    worlds = worlds_at(OVER)
+    worlds.push(0, "link5", point, force, 0.1, 0.6, ramp_s=0.05)
+    trace = run(worlds, 400)[0]
+    assert_allclose(trace["tau_arm"][:100], 0.0, atol=1e-12)
+    model, data = worlds.models[0], worlds.datas[0]
+    body = model.body("link5").id
+    J = np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, J, np.zeros_like(J), data.xpos[body] + data.xmat[body].reshape(3, 3) @ point, body)
+    assert_allclose(trace["tau_arm"][-1], J.T @ force, rtol=1e-9)
+    assert_allclose(run(worlds, 250)[0]["tau_arm"][-1], 0.0, atol=1e-12)
+
+
+def test_a_push_rises_and_falls_when_it_should():
+    worlds = worlds_at(OVER)
+    worlds.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 10.0, 0.0), 0.1, 0.2, ramp_s=0.02)
+    size = np.abs(run(worlds, 300)[0]["tau_arm"]).max(axis=1)
+    assert_allclose(size[[109, 199]] / size[119], (0.5, 1.0), rtol=0.05)
+    assert np.flatnonzero(size)[[0, -1]].tolist() == [100, 199]
+
+
+def test_what_hits_nothing_feels_nothing():
+    far = Obstacle((0.0, 0.8, 0.5), radius=0.05, stiffness=2000.0)
+    trace = run(worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(far,))), 500)[0]
+    assert trace["obstacle_force"].max() == 0.0
+    assert_allclose(trace["obstacle_position"][-1, 0], far.position, atol=1e-9)
+    assert CALM.obstacles == ()
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        (
+            {"radius": 0.03, "stiffness": 2e3, "mass": 1e-4},
+            "obstacle mass = 0.0001 kg; give 0.1 kg or more, lighter ones hardly push back",
+        ),
+        (
+            {"radius": 0.0, "stiffness": 2e3},
+            "obstacle radius = 0.0 m, stiffness = 2000.0 N/m; both must be greater than 0",
+        ),
+    ],
+)
+def test_obstacles_that_cannot_be_are_refused(fields, text):
+    with pytest.raises(InvalidInputError) as caught:
+        Obstacle((0.0, 0.0, 0.0), **fields)
+    assert str(caught.value) == text
+
+
+def test_a_world_has_room_for_four_obstacles():
+    with pytest.raises(InvalidInputError) as caught:
+        WorldConfig(obstacles=(bottle((0.0, 0.0, 0.0)),) * 5)
+    assert str(caught.value) == "5 obstacles asked for; a world holds at most 4"
