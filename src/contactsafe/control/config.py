@@ -27,7 +27,7 @@ class ControllerConfig:
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
         contact_damping: damping of every joint while in contact, N m s/rad.
         approach_damping: damping of motion into an obstacle, along the contact's direction, N m s/rad.
-        push_yield_nm: largest commanded push along the contact while the arm is what ran into something, N m; inf for none.
+        push_yield_nm: largest commanded push along the contact while the arm is what ran into it, N m; inf for none.
         push_hold_nm: the same while something pushes the arm, N m; inf for none.
         work_hold_j: work received beyond what an elastic obstacle could give back that tells a pusher, J.
         hold_rise: the arm yields again when, doing the work itself, it meets this many times the torque of the pusher.

@@ -136,6 +136,9 @@ class Controller:
                 "give measured joint positions in radians"
             )
         self.record["state"] = np.zeros((), dtype=self.record["state"].dtype)
+        # Should the first measurement be unusable, the torque to repeat is the one that keeps the arm where it is.
+        self.record["dynamics"] = self.arm.dynamics(q, np.zeros(self.arm.n))
+        self.record["state"]["tau"] = self.record["dynamics"]["g"]
         pose = self.arm.tool_pose(q)
         held = self.record["state"]["target"]
         held["position"], held["quat"], held["q_pose"] = pose.position, pose.quat, q

@@ -158,9 +158,9 @@ def push_along(direction, M_inv, tau_net):
 def is_pushed(work, work_least, torque, torque_peak, margin):
     """Tell something that pushes the arm from something the arm ran into, by what it gives back.
 
-    An elastic contact into which the arm put the work W, and whose torque has since fallen from its peak, has given back
-    W (1 − (torque/peak)²) at the most, whatever its stiffness; a lossy one less. More than that comes from a pusher. A
-    share of W is allowed on top: springs are not quite linear, nor lever arms constant.
+    An elastic contact into which the arm put the work W, and whose torque has since fallen from its peak, has given
+    back W (1 − (torque/peak)²) at the most, whatever its stiffness; a lossy one less. More than that comes from a
+    pusher. A share of W is allowed on top: springs are not quite linear, nor lever arms constant.
 
     Args:
         work: net work received from the contact since it was found, J.

@@ -19,8 +19,8 @@ FREE, CONTACT = 0, 1
 
 FAULTS = {
     0: "none",
-    1: "measurement is not finite; the last torque was repeated",
-    2: "target is not finite; the last good target holds",
+    1: "measurement is not finite or absurdly large; the last torque was repeated",
+    2: "target is not finite or absurdly large; the last good target holds",
     3: "target quaternion is not of unit length; the last good target holds",
     4: "target stiffness or damping is out of range; the last good target holds",
     5: "measurements stayed unusable for 20 ticks; gravity compensation only",
@@ -58,8 +58,9 @@ def params_dtype(n: int) -> np.dtype:
     scalars = (
         "trigger_share", "observer_share", "lowpass_share", "residual_threshold", "null_damping", "contact_damping",
         "push_yield_nm", "push_hold_nm", "work_hold_j", "hold_rise", "approach_damping",
-        "recover_share", "recover_from", "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin", "joint_stop_stiffness",
-        "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step", "dt",
+        "recover_share", "recover_from", "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin",
+        "joint_stop_stiffness", "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step",
+        "dt",
     )  # fmt: skip
     return np.dtype(
         [(name, _f) for name in scalars]

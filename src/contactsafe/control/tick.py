@@ -22,10 +22,13 @@ from contactsafe.control.laws import (
 from contactsafe.control.records import CONTACT, FREE
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
+from contactsafe.robot.linalg import dot, matmul, matvec_t
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 _LOST_AFTER_TICKS = 20
+
+_ABSURD = 1e6
+"""No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
 
 _SETTLED = 0.75
 """A torque has stopped rising when the slower residual has come this near to the faster one."""
@@ -38,15 +41,15 @@ def control_tick(c):
     Order: refuse bad numbers, nominal dynamics, observer, supervisor, law, push bound, friction and joint stops,
     limits. Bad numbers never raise: the last good target or torque holds and `fault` says why.
     """
-    if not _measurement_is_finite(c.measurement):
+    if not _measurement_is_usable(c.measurement):
         _tick_without_measurement(c)
         return
-    c.state.bad_ticks = 0
     _accept_target(c)
     update_dynamics(c.handle, c.measurement.q, c.measurement.qd, c.dynamics)
     if c.state.started == 0:
         _start(c)
     _observe(c)
+    c.state.bad_ticks = 0
     _supervise(c)
     tau = _law(c)
     _finish(c, tau)
@@ -54,22 +57,22 @@ def control_tick(c):
 
 @compiled(nogil=True)
 def tick_at(controllers, i):
-    """Run `control_tick` on one of an array of records: from Python an array is handed over far faster than a record."""
+    """Run `control_tick` on one of an array of records: Python hands over an array far faster than a record."""
     control_tick(controllers[i])
 
 
 @compiled
-def _all_finite(x):
+def _all_usable(x):
     for i in range(x.shape[0]):
-        if not math.isfinite(x[i]):
+        if not abs(x[i]) < _ABSURD:  # NaN as well
             return False
     return True
 
 
 @compiled
-def _measurement_is_finite(m):
-    wrench_ok = m.has_wrench == 0 or _all_finite(m.wrench_ee)
-    return wrench_ok and _all_finite(m.q) and _all_finite(m.qd)
+def _measurement_is_usable(m):
+    wrench_ok = m.has_wrench == 0 or _all_usable(m.wrench_ee)
+    return wrench_ok and _all_usable(m.q) and _all_usable(m.qd)
 
 
 @compiled
@@ -95,8 +98,8 @@ def _tick_without_measurement(c):
 
 @compiled
 def _target_fault(target, params):
-    finite = _all_finite(target.position) and _all_finite(target.quat) and _all_finite(target.q_pose)
-    if not (finite and _all_finite(target.K_task) and _all_finite(target.D_task)):
+    usable = _all_usable(target.position) and _all_usable(target.quat) and _all_usable(target.q_pose)
+    if not (usable and _all_usable(target.K_task) and _all_usable(target.D_task)):
         return _BAD_TARGET
     if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
         return _BAD_QUATERNION
@@ -139,17 +142,24 @@ def _start(c):
 
 @compiled
 def _observe(c):
-    """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14)."""
+    """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14).
+
+    After unusable measurements it is the mean since the last good one, during which the torque was repeated.
+    """
     state, dynamics, params = c.state, c.dynamics, c.params
     n = state.tau.shape[0]
+    since = params.dt * (1 + state.bad_ticks)
+    known = state.bad_ticks <= _LOST_AFTER_TICKS
     p = momentum(dynamics.M, c.measurement.qd)
     tau_external = np.empty(n)
     for i in range(n):
         beta = dynamics.g[i] - dynamics.CT_qd[i]
         applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
-        tau_external[i] = (p[i] - state.momentum[i]) / params.dt - applied
+        tau_external[i] = (p[i] - state.momentum[i]) / since - applied
         state.beta[i] = beta
         state.momentum[i] = p[i]
+    if not known:
+        return
     if c.measurement.has_wrench != 0 and params.cancel_tool_wrench != 0:
         tau_tool = matvec_t(dynamics.J, c.measurement.wrench_ee)
         for i in range(n):
@@ -219,7 +229,7 @@ def _watch_work(c):
     elif power >= 0.0:
         state.peak_nm = max(state.peak_nm, size)
     elif size > params.hold_rise * state.peak_nm:
-        # The torque rises well above what the pusher showed, while the arm does the work: that is running into something.
+        # The torque rises well above the pusher's while the arm does the work: that is running into something.
         state.holding, state.work_j, state.work_least_j = 0, 0.0, 0.0
 
 

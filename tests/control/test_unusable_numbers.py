@@ -1,0 +1,151 @@
+"""A tick never raises and never sends a number that is not finite, whatever it is fed."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from tests.control.plant import Plant, controller_at, hold, reach
+
+from contactsafe import Measurement, presets
+from contactsafe.control.controller import Controller
+from contactsafe.control.records import FAULTS
+from contactsafe.control.tick import tick_at
+
+CONFIG = replace(presets.safe(), friction_compensation=False)
+UNUSABLE = [np.nan, np.inf, -np.inf, 1e6, -1e200]
+
+
+@pytest.fixture
+def running(panda):
+    """A controller at home after one good tick of a target that is not where it stands, and its records."""
+    records = np.zeros(1, dtype=Controller(panda, CONFIG).record.dtype)
+    controller = controller_at(panda, CONFIG, records=records)
+    controller.set_target(reach(panda, [0.01, 0.01, 0.01]))
+    records[0]["measurement"]["q"] = panda.home
+    tick_at(records, 0)
+    assert records[0]["output"]["fault"] == 0
+    return controller, records
+
+
+@pytest.mark.parametrize("value", UNUSABLE)
+@pytest.mark.parametrize("field", ["q", "qd", "wrench_ee"])
+def test_unusable_measurement_repeats_the_last_torque(running, field, value):
+    _, records = running
+    before = records[0]["output"]["torque"].copy()
+    records[0]["measurement"]["has_wrench"] = 1
+    records[0]["measurement"][field][3] = value
+    tick_at(records, 0)
+    assert_array_equal(records[0]["output"]["torque"], before)
+    assert FAULTS[int(records[0]["output"]["fault"])] == (
+        "measurement is not finite or absurdly large; the last torque was repeated"
+    )
+
+
+def test_a_wrench_that_is_not_measured_is_not_looked_at(running):
+    _, records = running
+    records[0]["measurement"]["wrench_ee"] = np.nan
+    tick_at(records, 0)
+    assert records[0]["output"]["fault"] == 0
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "text"),
+    [(field, value, FAULTS[2]) for field in ("position", "quat", "K_task", "D_task", "q_pose") for value in UNUSABLE]
+    + [
+        ("quat", 0.9, "target quaternion is not of unit length; the last good target holds"),
+        ("K_task", 9.99, "target stiffness or damping is out of range; the last good target holds"),
+        ("K_task", 1500.1, "target stiffness or damping is out of range; the last good target holds"),
+        ("D_task", 1.99, "target stiffness or damping is out of range; the last good target holds"),
+        ("D_task", 120.1, "target stiffness or damping is out of range; the last good target holds"),
+    ],
+)
+def test_unusable_target_leaves_the_last_good_one_in_force(running, field, value, text):
+    _, records = running
+    good = copy.deepcopy(records)
+    records[0]["target"][field][2] = value
+    for k in range(3):
+        tick_at(records, 0)
+        tick_at(good, 0)
+        assert_array_equal(records[0]["output"]["torque"], good[0]["output"]["torque"], err_msg=f"tick {k}")
+    assert FAULTS[2] == "target is not finite or absurdly large; the last good target holds"
+    assert FAULTS[int(records[0]["output"]["fault"])] == text
+
+
+def test_fault_stays_until_reset_and_is_the_first(running, panda):
+    controller, records = running
+    records[0]["target"]["K_task"] = 5.0
+    tick_at(records, 0)
+    records[0]["target"]["K_task"] = 150.0
+    records[0]["target"]["quat"] = 2.0
+    for _ in range(3):
+        tick_at(records, 0)
+    assert records[0]["output"]["fault"] == 4
+    controller.reset(panda.home)
+    assert controller.step(Measurement(panda.home, np.zeros(7)), hold(panda)).fault == "none"
+
+
+def test_after_twenty_unusable_measurements_only_gravity_is_carried(panda):
+    """It gets there by at most 1 N m a tick, says so, and gravity is that of the last posture seen."""
+    plant, controller = Plant(panda), controller_at(panda, CONFIG)
+    target = reach(panda, [0.05, 0.05, 0.05])
+    last = plant.run(controller, target, 30).torque
+    g = panda.dynamics(np.array(controller.record["measurement"]["q"]), np.zeros(7))["g"]
+    assert np.abs(last - g).max() > 3.0
+    blind = Measurement(np.full(7, np.nan), np.zeros(7))
+    for _ in range(20):
+        out = controller.step(blind, target)
+        assert_array_equal(out.torque, last)
+    for _ in range(100):
+        before, out = out.torque, controller.step(blind, target)
+        assert np.abs(out.torque - before).max() <= 1.0
+    assert_allclose(out.torque, g, rtol=0, atol=1e-12)
+    assert out.fault == "measurements stayed unusable for 20 ticks; gravity compensation only"
+
+
+def test_arm_dropped_when_the_very_first_measurement_was_unusable(panda):
+    controller = controller_at(panda, CONFIG)
+    g = panda.dynamics(panda.home, np.zeros(7))["g"]
+    for _ in range(30):
+        out = controller.step(Measurement(np.full(7, np.nan), np.zeros(7)), hold(panda))
+        assert_allclose(out.torque, g, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1, 10, 19, 40])
+def test_gap_in_the_measurements_was_taken_for_a_contact(panda, gap):
+    """The momentum gained during the gap was divided by one tick."""
+    plant, controller = Plant(panda), controller_at(panda, CONFIG)
+    target = reach(panda, [0.1, 0.1, 0.0])
+    plant.run(controller, target, 100)
+    for _ in range(gap):
+        plant.step(controller.step(Measurement(plant.q, np.full(7, np.nan)), target).torque)
+    seen = []
+    plant.run(controller, target, 50, each=lambda out: seen.append(np.abs(out.contact.torque).max()))
+    assert max(seen) < 0.05
+
+
+def test_random_nonsense_never_gives_a_torque_that_is_not_finite(panda):
+    rng = np.random.default_rng(11)
+    records = np.zeros(1, dtype=Controller(panda, CONFIG).record.dtype)
+    controller = controller_at(panda, CONFIG, records=records)
+    good = Measurement(panda.home, np.zeros(7))
+    g = before = controller.step(good, hold(panda)).torque
+    for _ in range(3000):
+        c = records[0]
+        for group in ("measurement", "target"):
+            for name in c[group].dtype.names:
+                if name != "has_wrench" and rng.random() < 0.3:
+                    scale = 10.0 ** rng.integers(-300, 300)
+                    c[group][name] = rng.choice([0.0, 1.0, scale, np.nan, np.inf], c[group][name].shape)
+        c["measurement"]["has_wrench"] = rng.integers(2)
+        tick_at(records, 0)
+        torque = c["output"]["torque"].copy()
+        assert np.isfinite(torque).all()
+        assert (np.abs(torque) <= panda.tau_max).all()
+        assert np.abs(torque - before).max() <= 1.0
+        before = torque
+        if rng.random() < 0.3:
+            c["measurement"]["q"], c["measurement"]["qd"] = panda.home, rng.normal(size=7)
+    controller.reset(panda.home)
+    assert_allclose(controller.step(good, hold(panda)).torque, g, rtol=0, atol=1e-9)
