@@ -1,4 +1,4 @@
-"""Contact-safe learned manipulation: a policy moves a torque-controlled arm in contact, and every contact stays gentle."""
+"""Contact-safe learned manipulation: a policy moves a torque-controlled arm, and every contact stays gentle."""
 
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig

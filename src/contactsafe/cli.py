@@ -1,5 +1,6 @@
 """The command line: the one place that composes everything."""
 
+import datetime
 import importlib.util
 import inspect
 import sys
@@ -7,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import tyro
 from tqdm import tqdm
@@ -120,6 +121,7 @@ def evaluate(
     import gymnasium
 
     from contactsafe.envs.config import WipingConfig
+    from contactsafe.envs.wiping import WipingVectorEnv
     from contactsafe.learning.evaluation import evaluate_policy
     from contactsafe.learning.policy import Policy
 
@@ -132,7 +134,7 @@ def evaluate(
     env = gymnasium.make_vec(
         "contactsafe/Wiping-v0", num_envs=min(16, episodes), config=WipingConfig(controller=controller)
     )
-    policy = Policy(loaded, env.unwrapped.camera_homography)
+    policy = Policy(loaded, cast(WipingVectorEnv, env).camera_homography)
     with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
         results = evaluate_policy(policy, env, episodes, seed, on_episode=lambda record: bar.update())
     env.close()
@@ -243,10 +245,15 @@ def _run(names: Sequence[str], bundle: Bundle, config: ExperimentConfig) -> list
 
 
 def _facts(command: str, config: ExperimentConfig, bundle: Bundle, seconds: float) -> dict:
+    from contactsafe.experiments.disturbance import PUSH_S
+
+    names = ",".join(config.controllers)
     return {
-        "command": f"{command} --trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}",
+        "command": f"{command} --trials {config.trials} --seed {config.seed} --controllers {names}",
+        "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(range(config.seed, config.seed + config.trials)),
-        "policy": bundle.manifest["files"],
+        "bundle_sha256": {name: entry["sha256"] for name, entry in bundle.manifest["files"].items()},
+        "push_s": PUSH_S,
         "seconds": round(seconds, 1),
     }
 

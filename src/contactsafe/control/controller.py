@@ -222,7 +222,9 @@ class Controller:
 
 def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
     """Give each field of one record as an array that shares its memory: reading and writing it is quick."""
-    return {name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names}
+    return {
+        name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names or ()
+    }
 
 
 def _shaped(value, n: int, name: str) -> np.ndarray:

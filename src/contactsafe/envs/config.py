@@ -13,7 +13,7 @@ class ActionConfig:
     """How an action in [−1, 1]¹⁸ moves the target, each policy step of 1/60 s.
 
     Attributes:
-        translation: largest step of x_d along x, y, z, m (0.4 m/s along the board, 0.18 m/s towards it).
+        translation: largest step of x_d along x, y, z, m (0.4 m/s along the board, 0.12 m/s towards it).
         rotation: largest step of x_d about x, y, z, rad.
         stiffness: largest step of K1, 1/s²; at K = 100 that is 600 1/s³, within the passive rate of Kronander &
             Billard 2016 (775 1/s³).
@@ -28,17 +28,17 @@ class ActionConfig:
         stiffness_start: K1 at the start of an episode, 1/s²; D1 starts critical.
     """
 
-    translation: tuple[float, float, float] = (0.0067, 0.0067, 0.003)
+    translation: tuple[float, float, float] = (0.0067, 0.0067, 0.002)
     rotation: tuple[float, float, float] = (0.01, 0.01, 0.02)
     stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
     damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
     lead: float = 0.05
-    press: float = 0.01
+    press: float = 0.006
     height: float = 0.12
     reach: float = 0.27
     tilt: float = 0.1
     stiffness_low: Six = (60.0, 60.0, 60.0, 250.0, 250.0, 250.0)
-    stiffness_high: Six = (300.0, 300.0, 300.0, 700.0, 700.0, 700.0)
+    stiffness_high: Six = (250.0, 250.0, 250.0, 700.0, 700.0, 700.0)
     damping_low: Six = (14.0, 14.0, 14.0, 30.0, 30.0, 30.0)
     damping_high: Six = (40.0, 40.0, 40.0, 60.0, 60.0, 60.0)
     stiffness_start: Six = (150.0, 150.0, 150.0, 450.0, 450.0, 450.0)
@@ -67,14 +67,15 @@ class RewardConfig:
     time: float = -0.01
     force: float = -0.02
     force_limit_n: float = 40.0
-    gentle_n: float = 12.0
+    gentle_n: float = 10.0
     arm_table: float = -5.0
 
     def __post_init__(self):
         """Refuse a reward under which staying in contact for ever pays."""
         if self.contact + self.time >= 0:
             raise InvalidInputError(
-                f"reward contact {self.contact} + time {self.time} ≥ 0 pays for never finishing; keep contact below {-self.time}"
+                f"reward contact {self.contact} + time {self.time} ≥ 0 pays for never finishing; "
+                f"keep contact below {-self.time}"
             )
 
 

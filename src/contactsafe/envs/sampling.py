@@ -70,7 +70,7 @@ class MaskSampler:
         board = tasks.config.world.board
         reach = board.ink_size / 2 + 0.05
         height = _RAISED if rng.uniform() < _SHARE_RAISED else 0.08 * rng.uniform() ** 2
-        tool = np.array(board.centre) + [*rng.uniform(-reach, reach, 2), height]
+        tool = np.add(board.centre, [*rng.uniform(-reach, reach, 2), height])
         tasks.worlds.place(0, tasks.posture_over(Pose(tool, DOWN)))
         return tool
 

@@ -71,10 +71,11 @@ class WipingTasks:
             board.draw_random(rng)
         else:
             board.draw(drawing)
-        centre = np.array(config.world.board.centre)
         if start is None:
             reach = config.start_reach
-            start = centre + [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
+            start = np.add(
+                config.world.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
+            )
         worlds.reset(i, self.posture_over(Pose(np.asarray(start, dtype=float), DOWN)))
         controller = worlds.controllers[i]
         target = controller["target"]

@@ -37,7 +37,7 @@ class WipingEnv(gymnasium.Env):
         render_mode: 'rgb_array' gives the mask enlarged, or None.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": POLICY_RATE_HZ}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": POLICY_RATE_HZ}
 
     def __init__(self, config: WipingConfig | None = None, render_mode: str | None = None):
         self.tasks = WipingTasks(config)
@@ -84,7 +84,7 @@ class WipingVectorEnv(gymnasium.vector.VectorEnv):
         config: of the task.
     """
 
-    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_fps": POLICY_RATE_HZ}  # noqa: RUF012
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_fps": POLICY_RATE_HZ}
 
     def __init__(self, num_envs: int = 1, config: WipingConfig | None = None):
         if num_envs < 1:

@@ -1,4 +1,4 @@
-"""Disturbance: lasting pushes of 25 N on the arm while the tool holds and while it wipes; how far does the tool move?"""
+"""Disturbance: lasting pushes of 25 N on the arm while the tool holds and while it wipes; how far does it stray?"""
 
 import math
 

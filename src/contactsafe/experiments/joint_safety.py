@@ -1,4 +1,4 @@
-"""Joint safety: a dark object nobody trained with draws the policy to the right, and the forearm runs into something."""
+"""Joint safety: a dark object unknown to the policy draws it to the right, and the forearm runs into something."""
 
 from collections.abc import Callable
 

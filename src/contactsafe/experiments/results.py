@@ -109,7 +109,8 @@ def spread(values: list[float]) -> Spread:
     """Summarise one figure over seeds; trials where it does not exist (NaN) are left out."""
     numbers = np.array([value for value in values if np.isfinite(value)])
     if numbers.size == 0:
-        return Spread(*[float("nan")] * 5, 0)
+        nan = float("nan")
+        return Spread(nan, nan, nan, nan, nan, 0)
     p5, median, p95 = np.percentile(numbers, [5, 50, 95])
     return Spread(float(median), float(p5), float(p95), float(numbers.min()), float(numbers.max()), int(numbers.size))
 

@@ -98,6 +98,10 @@ def _parts(one: WipingTasks, many: WipingTasks, policy: Policy) -> dict[str, tup
         for _ in range(_TICKS):
             tick_at(worlds.controllers, 0)
 
+    def run_physics_and_tick():
+        for _ in range(_TICKS // MAX_TICKS):
+            worlds.run(MAX_TICKS)
+
     def step_many():
         for i in range(_ENVS):
             if many.tasks["steps"][i] > 600:
@@ -109,7 +113,7 @@ def _parts(one: WipingTasks, many: WipingTasks, policy: Policy) -> dict[str, tup
             lambda: _bare_physics(bare.plants[0]["model"], bare.plants[0]["data"], _TICKS),
             _TICKS,
         ),
-        "physics and control tick": (lambda: [worlds.run(MAX_TICKS) for _ in range(_TICKS // MAX_TICKS)], _TICKS),
+        "physics and control tick": (run_physics_and_tick, _TICKS),
         "control tick, compiled loop": (lambda: _ticks(controller, _TICKS), _TICKS),
         "control tick, called from Python": (tick_from_python, _TICKS),
         "mask, 128 × 128": (

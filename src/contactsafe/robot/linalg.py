@@ -1,4 +1,4 @@
-"""Small dense algebra for the compiled tick: matrices of six or seven rows, where a LAPACK call costs more than the work."""
+"""Small dense algebra for the compiled tick: at six or seven rows a LAPACK call costs more than the work."""
 
 import numpy as np
 

@@ -24,8 +24,8 @@ def _load_library() -> pathlib.Path:
     low, high = SUPPORTED_MUJOCO
     if not low <= found < high:
         raise UnsupportedVersionError(
-            f"mujoco {mujoco.__version__} is installed; contactsafe calls MuJoCo natively and was checked with 4.0 only; "
-            "run: pip install 'mujoco>=4.0,<4.1'"
+            f"mujoco {mujoco.__version__} is installed; contactsafe calls MuJoCo natively and was "
+            "checked with 4.0 only; run: pip install 'mujoco>=4.0,<4.1'"
         )
     libraries = sorted(pathlib.Path(mujoco.__file__).parent.glob("*mujoco*.so*")) or sorted(
         pathlib.Path(mujoco.__file__).parent.glob("libmujoco*.dylib")
@@ -33,7 +33,8 @@ def _load_library() -> pathlib.Path:
     libraries = [path for path in libraries if path.name.startswith("libmujoco")]
     if not libraries:
         raise UnsupportedVersionError(
-            "mujoco is installed without its shared library libmujoco; install the official wheel: pip install --force-reinstall mujoco"
+            "mujoco is installed without its shared library libmujoco; install the official wheel: "
+            "pip install --force-reinstall mujoco"
         )
     llvmlite.binding.load_library_permanently(str(libraries[0]))
     return libraries[0]

@@ -1,0 +1,25 @@
+"""Every example runs, and does what it says."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("[0-9]*.py"))
+
+
+def load(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_runs_and_says_something(path, capsys):
+    load(path).main()
+    assert capsys.readouterr().out.strip()
+
+
+def test_the_controller_alone_holds_the_tool_under_a_push():
+    assert load(EXAMPLES[0]).main() < 0.01
