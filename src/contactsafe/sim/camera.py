@@ -152,10 +152,7 @@ def render_mask(camera, cells, plant, out):
 def _hide_behind(camera, is_box, size, centre, mat, out):
     """Unmark the marked pixels whose line of sight meets one shape before the board."""
     eye, focal = camera.position, camera.focal_px[0]
-    if is_box:
-        bound = math.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2)
-    else:
-        bound = size[0] + size[1]
+    bound = math.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2) if is_box else size[0] + size[1]
     x = np.zeros(3)
     for k in range(3):
         for m in range(3):

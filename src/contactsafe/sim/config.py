@@ -32,8 +32,9 @@ class PlantConfig:
             raise InvalidInputError(f"torque_delay_ticks = {self.torque_delay_ticks}; give 0 or 1")
         if self.friction_scale < 0 or self.inertia_scale <= 0 or self.payload_kg < 0:
             raise InvalidInputError(
-                f"plant (friction × {self.friction_scale}, inertia × {self.inertia_scale}, payload {self.payload_kg} kg) "
-                "cannot exist; friction_scale and payload_kg must be ≥ 0, inertia_scale > 0"
+                f"plant (friction × {self.friction_scale}, inertia × {self.inertia_scale}, "
+                f"payload {self.payload_kg} kg) cannot exist; "
+                "friction_scale and payload_kg must be ≥ 0, inertia_scale > 0"
             )
 
 
