@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.sim.scenes import (
-    BOARD_Z, CALM, aim, contact_torque, contact_wrench, panda, posture, run, worlds_at,
+    BOARD_Z,
+    CALM,
+    aim,
+    contact_torque,
+    contact_wrench,
+    panda,
+    posture,
+    run,
+    worlds_at,
 )  # fmt: skip
 
 from contactsafe.errors import InvalidInputError
