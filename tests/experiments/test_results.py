@@ -1,0 +1,84 @@
+"""Spreads over seeds and strict JSON."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.experiments.config import BATCH, ExperimentConfig
+from contactsafe.experiments.results import Experiment, Trial, spread, to_json
+
+NAN = float("nan")
+
+
+def experiment():
+    trials = [
+        Trial(scenario, controller, seed, {"force_n": value, "time_s": NAN})
+        for scenario, controller, values in (("bottle", "vices", (4.0, 1.0, 2.0)), ("bottle", "safe", (1.0, NAN, 3.0)))
+        for seed, value in enumerate(values)
+    ]
+    return Experiment("joint-safety", "How hard?", tuple(trials))
+
+
+def test_a_spread_is_the_quantiles_of_the_values():
+    values = np.random.default_rng(0).normal(size=101)
+    found = spread(list(values))
+    ordered = np.sort(values)
+    assert (found.median, found.p5, found.p95) == pytest.approx((ordered[50], ordered[5], ordered[95]))
+    assert (found.min, found.max, found.n) == (ordered[0], ordered[-1], 101)
+
+
+def test_figures_that_do_not_exist_are_left_out_and_counted():
+    found = spread([NAN, 1.0, 3.0, math.inf])
+    assert (found.median, found.min, found.max, found.n) == (2.0, 1.0, 3.0, 2)
+    empty = spread([NAN])
+    assert empty.n == 0
+    assert all(math.isnan(value) for value in (empty.median, empty.p5, empty.p95, empty.min, empty.max))
+
+
+def test_spreads_gather_by_scenario_controller_and_metric():
+    spreads = experiment().spreads()
+    assert spreads["bottle"]["vices"]["force_n"].median == 2.0
+    assert spreads["bottle"]["safe"]["force_n"].n == 2
+    assert spreads["bottle"]["safe"]["time_s"].n == 0
+
+
+def test_json_is_strict_and_says_null_where_nothing_is():
+    text = to_json(experiment().as_dict())
+    assert not {"NaN", "Infinity"} & set(text.replace(",", " ").split())
+    read = json.loads(text, parse_constant=pytest.fail)
+    assert read["spread"]["bottle"]["safe"]["time_s"] == {
+        "median": None, "p5": None, "p95": None, "min": None, "max": None, "n": 0,
+    }  # fmt: skip
+    assert read["trials"][4] == {
+        "scenario": "bottle", "controller": "safe", "seed": 1, "metrics": {"force_n": None, "time_s": None},
+    }  # fmt: skip
+
+
+def test_what_is_no_number_never_reaches_a_file():
+    with pytest.raises(ValueError, match="JSON compliant"):
+        to_json({"force_n": NAN})
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"controllers": ("safe", "best")}, "controller 'best' is unknown; choose from vices, paper, safe"),
+        ({"controllers": ()}, "no controller given; choose from vices, paper, safe"),
+        ({"trials": 0}, "trials = 0; give 1 or more"),
+        ({"seed": -1}, "seed = -1; give 0 or more"),
+    ],
+)
+def test_experiments_that_cannot_be_run_are_refused(fields, text):
+    with pytest.raises(InvalidInputError) as caught:
+        ExperimentConfig(**fields)
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("trials", [1, BATCH, BATCH + 1, 40])
+def test_batches_hold_every_seed_once_in_order(trials):
+    batches = ExperimentConfig(trials=trials, seed=5).batches()
+    assert [seed for batch in batches for seed in batch] == list(range(5, 5 + trials))
+    assert max(len(batch) for batch in batches) <= BATCH
