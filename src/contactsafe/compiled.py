@@ -17,12 +17,14 @@ import numba
 import numpy as np
 
 _KEPT_VERSIONS = 4
+_ROOMS = ("robot", "control", "sim", "envs")  # where compiled functions call each other across files
 
 
 def _digest() -> str:
-    """Fingerprint what compiled code depends on: our sources, numba, llvmlite, NumPy."""
+    """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy."""
     fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
-    for path in sorted(pathlib.Path(__file__).parent.rglob("*.py")):
+    root = pathlib.Path(__file__).parent
+    for path in [root / "compiled.py", *(path for room in _ROOMS for path in sorted((root / room).rglob("*.py")))]:
         fingerprint.update(path.read_bytes())
     return fingerprint.hexdigest()[:16]
 

@@ -22,7 +22,7 @@ from contactsafe.control.laws import (
 from contactsafe.control.records import CONTACT, FREE
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import dot, matmul, matvec_t
+from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 _LOST_AFTER_TICKS = 20
@@ -241,22 +241,22 @@ def _law(c):
     Lambda, J_M_inv = task_inertia(
         dynamics.J, dynamics.M_inv, params.manipulability_floor, params.manipulability_damping
     )
-    J_bar = matmul(J_M_inv.T, Lambda)
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     F = impedance_wrench(Lambda, error, dynamics.velocity, dynamics.Jdot_qd, target.K_task, target.D_task)
-    N_t = task_nullspace(dynamics.J, J_bar)
     tau_pose = posture_torque(target.q_pose, q, qd, state.posture_share * params.K_pose, params.D_pose)
     c.output.error[:] = error
     c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
     if state.mode == FREE:
-        tau_net = matvec_t(dynamics.J, F) + matvec_t(N_t, tau_pose)
+        # N_tᵀ Γ = Γ − Jᵀ Λ J M⁻¹ Γ, without forming the projector.
+        F_pose = matvec(Lambda, matvec(J_M_inv, tau_pose))
+        tau_net = matvec_t(dynamics.J, F - F_pose) + tau_pose
     else:
-        tau_net = _contact_law(c, F, J_bar, N_t, tau_pose)
+        tau_net = _contact_law(c, F, matmul(J_M_inv.T, Lambda), tau_pose)
     return tau_net + dynamics.c + dynamics.g
 
 
 @compiled
-def _contact_law(c, F, J_bar, N_t, tau_pose):
+def _contact_law(c, F, J_bar, tau_pose):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
@@ -265,6 +265,7 @@ def _contact_law(c, F, J_bar, N_t, tau_pose):
     state, dynamics, params = c.state, c.dynamics, c.params
     qd, direction = c.measurement.qd, c.state.direction
     F_tc = F - matvec_t(J_bar, state.residual)
+    N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = contact_nullspace(N_t, dynamics.M_inv, direction)
     tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
     tau -= params.null_damping * matvec_t(N_t - N_ct, qd)

@@ -119,11 +119,13 @@ def _plain(value: Any) -> Any:
     """Make a value fit for strict JSON: NaN becomes null, floats keep six significant digits."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
     if isinstance(value, float):
         return float(f"{value:.6g}") if np.isfinite(value) else None
     return value
 
 
 def to_json(value: Any) -> str:
-    """Write strict JSON, indented."""
-    return json.dumps(value, indent=1, allow_nan=False)
+    """Write strict JSON, indented; a figure that does not exist (NaN) is null."""
+    return json.dumps(_plain(value), indent=1, allow_nan=False)

@@ -9,11 +9,12 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick, tick_at
 from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import WipingTasks
+from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.learning.policy import Policy
 from contactsafe.robot.native import mj_step
 from contactsafe.sim.camera import render_mask
-from contactsafe.sim.world import MAX_TICKS
+from contactsafe.sim.records import noise_channels
+from contactsafe.sim.stepping import run_ticks
 
 ROUNDS = 15
 """Times each part is timed."""
@@ -54,26 +55,30 @@ def _ticks(controller, n):
 def measure_speed(bundle, progress: Callable[[int], object] | None = None) -> list[Speed]:
     """Time bare physics, physics with the tick, the tick, the mask, the policy and the environment, in turns.
 
+    Parts of one thread are timed by the processor time they take, so that others on the machine weigh less; the
+    environment, whose threads share the cores, by the clock on the wall.
+
     Args:
         bundle: loaded `Bundle`.
         progress: told of every round done.
     """
-    one, many = _tasks(1), _tasks(_ENVS)
-    policy = Policy(bundle, one.worlds.homography)
-    parts = _parts(one, many, policy)
-    times: dict[str, list[float]] = {name: [] for name in parts}
-    for name, (run, _) in parts.items():
-        run()
-        del name
-    for _ in range(ROUNDS):
-        for name, (run, count) in parts.items():
-            start = time.perf_counter()
-            run()
-            times[name].append((time.perf_counter() - start) / count * 1e6)
-        if progress:
+    worlds = {"one": _tasks(1), "bare": _tasks(1), "many": _tasks(_ENVS)}
+    policy = Policy(bundle, worlds["one"].worlds.homography)
+    parts = _parts(worlds, policy)
+    times: dict[str, list[float]] = {part.name: [] for part in parts}
+    for timed in (False, *[True] * ROUNDS):
+        for tasks in worlds.values():
+            for i in range(tasks.worlds.n):
+                tasks.reset(i, np.random.default_rng(i))
+        for part in parts:
+            start = part.clock()
+            part.run()
+            if timed:
+                times[part.name].append((part.clock() - start) / part.count * 1e6)
+        if timed and progress:
             progress(1)
-    many.worlds.close()
-    bare = float(np.median(times["bare physics, one tick"]))
+    worlds["many"].worlds.close()
+    bare = float(np.median(times[parts[0].name]))
     return [
         Speed(name, float(np.median(values)), float(np.min(values)), float(np.median(values)) / bare)
         for name, values in times.items()
@@ -81,46 +86,58 @@ def measure_speed(bundle, progress: Callable[[int], object] | None = None) -> li
 
 
 def _tasks(n: int) -> WipingTasks:
-    tasks = WipingTasks(WipingConfig(), n, seed=0)
-    for i in range(n):
-        tasks.reset(i, np.random.default_rng(i))
-    return tasks
+    return WipingTasks(WipingConfig(), n, seed=0)
 
 
-def _parts(one: WipingTasks, many: WipingTasks, policy: Policy) -> dict[str, tuple[Callable[[], object], int]]:
-    """Name each part and give what runs it and how many times that is."""
-    worlds, bare = one.worlds, _tasks(1).worlds
-    plant, controller = worlds.plants[0], worlds.controllers[0]
-    observation, batch = one.observation(0), many.observation()
-    actions = np.zeros((_ENVS, 18))
+@dataclass(frozen=True)
+class _Part:
+    name: str
+    run: Callable[[], object]
+    count: int
+    clock: Callable[[], float] = time.thread_time
+
+
+def _parts(tasks: dict[str, WipingTasks], policy: Policy) -> list[_Part]:
+    """Name each part, what runs it and how many times that is; bare physics comes first."""
+    one, many = tasks["one"], tasks["many"]
+    worlds, bare = one.worlds, tasks["bare"].worlds
+    actions = np.zeros((_ENVS, ACTION_SIZE))
+
+    noise = np.random.default_rng(0).standard_normal((_TICKS, noise_channels(one.arm.n)))
+
+    def physics_and_tick():
+        run_ticks(
+            worlds.plants[0], worlds.controllers[0], worlds.cells[0], noise, _TICKS, worlds.reports[0],
+            worlds.no_trace[0],
+        )  # fmt: skip
 
     def tick_from_python():
         for _ in range(_TICKS):
             tick_at(worlds.controllers, 0)
 
-    def run_physics_and_tick():
-        for _ in range(_TICKS // MAX_TICKS):
-            worlds.run(MAX_TICKS)
+    def masks():
+        for _ in range(50):
+            render_mask(worlds.camera, worlds.cells[0], worlds.plants[0], worlds.masks[0])
 
-    def step_many():
-        for i in range(_ENVS):
-            if many.tasks["steps"][i] > 600:
-                many.reset(i, np.random.default_rng(i))
-        many.step(actions)
+    def act():
+        for _ in range(20):
+            policy.act(one.observation(0))
 
-    return {
-        "bare physics, one tick": (
+    def environment():
+        for _ in range(10):
+            many.step(actions)
+
+    return [
+        _Part(
+            "bare physics, one tick",
             lambda: _bare_physics(bare.plants[0]["model"], bare.plants[0]["data"], _TICKS),
             _TICKS,
         ),
-        "physics and control tick": (run_physics_and_tick, _TICKS),
-        "control tick, compiled loop": (lambda: _ticks(controller, _TICKS), _TICKS),
-        "control tick, called from Python": (tick_from_python, _TICKS),
-        "mask, 128 × 128": (
-            lambda: [render_mask(worlds.camera, worlds.cells[0], plant, worlds.masks[0]) for _ in range(50)],
-            50,
-        ),
-        "policy, image to action": (lambda: [policy.act(observation) for _ in range(20)], 20),
-        f"policy, batch of {_ENVS}, per image": (lambda: policy.act(batch), _ENVS),
-        f"environment, {_ENVS} at a time, per step": (step_many, _ENVS),
-    }
+        _Part("physics and control tick", physics_and_tick, _TICKS),
+        _Part("control tick, compiled loop", lambda: _ticks(worlds.controllers[0], _TICKS), _TICKS),
+        _Part("control tick, called from Python", tick_from_python, _TICKS),
+        _Part("mask, 128 × 128", masks, 50),
+        _Part("policy, image to action", act, 20),
+        _Part(f"policy, batch of {_ENVS}, per image", lambda: policy.act(many.observation()), _ENVS),
+        _Part(f"environment, {_ENVS} at a time, per step", environment, 10 * _ENVS, time.perf_counter),
+    ]

@@ -3,6 +3,7 @@
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 
@@ -121,7 +122,7 @@ def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
             body, "joint", name=f"{name}_{axis}", type="slide", axis=direction,
             stiffness=numbers([obstacle.stiffness]), damping=numbers([damping]),
         )  # fmt: skip
-    shape = {"type": "sphere", "size": numbers([obstacle.radius])}
+    shape: dict[str, Any] = {"type": "sphere", "size": numbers([obstacle.radius])}
     if obstacle.half_length > 0:
         shape = {"type": "cylinder", "size": numbers((obstacle.radius, obstacle.half_length))}
     ET.SubElement(
