@@ -57,9 +57,12 @@ def test_json_is_strict_and_says_null_where_nothing_is():
     }  # fmt: skip
 
 
-def test_what_is_no_number_never_reaches_a_file():
-    with pytest.raises(ValueError, match="JSON compliant"):
-        to_json({"force_n": NAN})
+def test_evaluation_of_a_policy_that_cleaned_nothing_is_still_json():
+    """`evaluate --json` ended in a traceback: the time to a clean board was NaN."""
+    text = to_json({"time_s": NAN, "boards": [{"time_s": NAN, "push_s": (0.5, math.inf)}]})
+    assert json.loads(text, parse_constant=pytest.fail) == {
+        "time_s": None, "boards": [{"time_s": None, "push_s": [0.5, None]}],
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
