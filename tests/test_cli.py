@@ -1,0 +1,196 @@
+"""The command line: help that teaches, exit status that can be trusted, one line for a user's mistake."""
+
+import importlib.util
+import json
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+import contactsafe
+from contactsafe.cli import COMMANDS, main
+from contactsafe.learning.bundle import shipped_bundle
+
+
+def mistake(capsys, *words):
+    """Run a command that must fail by its user's fault; give the one line it says."""
+    assert main(list(words)) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = err.strip().splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("contactsafe: ")
+    return lines[0].removeprefix("contactsafe: ")
+
+
+@pytest.fixture
+def bundle(tmp_path):
+    if not shipped_bundle().is_dir():
+        pytest.skip("no bundle is shipped here")
+    return shutil.copytree(shipped_bundle(), tmp_path / "bundle")
+
+
+def test_help_lists_every_command_with_what_it_does(capsys):
+    for word in ("--help", "-h"):
+        assert main([word]) == 0
+        text = capsys.readouterr().out
+        for name, command in COMMANDS.items():
+            assert name in text
+            assert command.run.__doc__.strip().splitlines()[0] in text
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name, capsys):
+    try:
+        status = main([name, "--help"])
+    except SystemExit as stop:
+        status = stop.code
+    assert status == 0
+    out = capsys.readouterr().out
+    assert f"usage: contactsafe {name}" in out
+    assert "Traceback" not in out
+
+
+@pytest.mark.parametrize("kind", ["vae", "ppo"])
+def test_training_has_help_of_its_own(kind, capsys):
+    pytest.importorskip("torch")
+    with pytest.raises(SystemExit) as stop:
+        main(["train", kind, "--help"])
+    assert stop.value.code == 0
+    assert "--resume" in capsys.readouterr().out
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"contactsafe {contactsafe.__version__}\n"
+
+
+def test_no_command_at_all_shows_the_help_and_fails(capsys):
+    assert main([]) == 2
+    assert "usage: contactsafe COMMAND" in capsys.readouterr().out
+
+
+def test_an_unknown_command_is_refused(capsys):
+    assert main(["dance"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == ("contactsafe: command 'dance' is unknown; choose from demo, train, evaluate, experiment, bench\n")
+
+
+@pytest.mark.parametrize("words", [["bench", "--fast"], ["experiment"], ["demo", "--trials", "many"]])
+def test_options_that_do_not_exist_exit_2(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            "experiment dancing",
+            "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance",
+        ),
+        (
+            "experiment disturbance --controllers safe,best",
+            "controller 'best' is unknown; choose from vices, paper, safe",
+        ),
+        ("experiment disturbance --controllers ,", "no controller given; choose from vices, paper, safe"),
+        ("experiment disturbance --trials 0", "trials = 0; give 1 or more"),
+        ("demo --seed -1", "seed = -1; give 0 or more"),
+        ("demo --controllers best", "controller 'best' is unknown; choose from vices, paper, safe"),
+        ("evaluate --controller best", "controller 'best' is unknown; choose from vices, paper, safe"),
+        ("evaluate --episodes 0", "episodes = 0; give 1 or more"),
+        ("evaluate --seed -2", "seed = -2; give 0 or more"),
+        ("train dog", "'contactsafe train dog' is unknown; choose vae or ppo"),
+    ],
+)
+def test_mistakes_are_told_in_one_line_with_the_remedy(words, text, capsys):
+    assert mistake(capsys, *words.split()) == text
+
+
+@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment disturbance --bundle", "bench --bundle"])
+def test_a_missing_bundle_is_told(command, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    missing = tmp_path / "nothing"
+    told = mistake(capsys, *command.split(), str(missing))
+    assert told == f"no bundle at {missing}: not a folder; give the path of a folder that holds bundle.json"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["policy.onnx", "encoder.onnx"])
+def test_a_damaged_bundle_is_told_and_nothing_is_written(name, bundle, tmp_path, capsys):
+    data = bytearray((bundle / name).read_bytes())
+    data[len(data) // 2] ^= 1
+    (bundle / name).write_bytes(data)
+    told = mistake(capsys, "demo", "--bundle", str(bundle), "--out", str(tmp_path / "out"))
+    assert told == (
+        f"{bundle / name} is not the file bundle.json was written for (size or SHA-256 differ); "
+        "copy or export the bundle anew"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bundle_that_is_not_whole_is_told(bundle, capsys):
+    (bundle / "policy.onnx").unlink()
+    told = mistake(capsys, "evaluate", str(bundle))
+    assert told == f"{bundle / 'policy.onnx'} is missing; the bundle is incomplete, copy or export it anew"
+
+
+@pytest.mark.parametrize("command", ["demo", "experiment disturbance"])
+def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(command, bundle, tmp_path, capsys):
+    (tmp_path / "file").write_text("not a folder")
+    out = tmp_path / "file" / "out"
+    told = mistake(capsys, *command.split(), "--bundle", str(bundle), "--out", str(out))
+    assert told == f"cannot write to {out}: not a directory; give a folder you may write to with --out"
+
+
+@pytest.mark.parametrize("kind", ["vae", "ppo"])
+def test_training_without_the_extra_says_what_to_install(kind, capsys, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else find(name))
+    told = mistake(capsys, "train", kind)
+    assert told == "training needs torch; run: pip install 'contactsafe[train]'"
+
+
+def test_control_c_stops_with_130_and_no_traceback(capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("contactsafe.cli.Bundle.load", interrupted)
+    assert main(["evaluate"]) == 130
+    assert capsys.readouterr().err == "contactsafe: stopped\n"
+
+
+def test_json_of_an_experiment_is_all_that_is_on_stdout(bundle, capsys):
+    words = "experiment disturbance --trials 1 --controllers vices,safe --seed 4 --json --bundle"
+    assert main([*words.split(), str(bundle)]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out, parse_constant=pytest.fail)
+    experiment = summary["experiments"]["disturbance"]
+    assert len(experiment["spread"]) == 6
+    assert {trial["seed"] for trial in experiment["trials"]} == {4}
+    assert {trial["controller"] for trial in experiment["trials"]} == {"vices", "safe"}
+    assert "disturbance" in err  # the progress bar
+
+
+def test_evaluate_says_how_the_policy_did(bundle, capsys):
+    assert main(["evaluate", str(bundle), "--episodes", "2", "--seed", "3", "--json"]) == 0
+    results = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert results["seed"] == 3
+    assert len(results["boards"]) == 2
+
+
+@pytest.mark.slow
+def test_the_installed_program_does_the_same():
+    """In a process of its own: status, and stdout apart from stderr."""
+    program = [sys.executable, "-c", "import sys; from contactsafe.cli import main; sys.exit(main())"]
+    good = subprocess.run([*program, "--version"], capture_output=True, text=True, timeout=120)
+    assert (good.returncode, good.stdout) == (0, f"contactsafe {contactsafe.__version__}\n")
+    bad = subprocess.run([*program, "experiment", "dancing"], capture_output=True, text=True, timeout=120)
+    assert bad.returncode == 1
+    assert bad.stdout == ""
+    assert bad.stderr.count("\n") == 1
+    assert "Traceback" not in bad.stderr
