@@ -7,6 +7,12 @@ import numpy as np
 
 from contactsafe.errors import InvalidInputError
 
+_PER_JOINT = ("K_pose", "D_pose")
+_MAY_BE_INFINITE = (
+    "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
+    "work_hold_j", "hold_rise",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class ControllerConfig:
@@ -79,11 +85,7 @@ class ControllerConfig:
             InvalidInputError: a field is not a number, negative, or out of order.
         """
         for field in fields(self):
-            value = np.asarray(getattr(self, field.name), dtype=float)
-            if np.isnan(value).any() or (value < 0).any():
-                raise InvalidInputError(
-                    f"{field.name} = {getattr(self, field.name)} has a negative number or NaN; give numbers ≥ 0"
-                )
+            _check_numbers(field.name, getattr(self, field.name), field.default)
         for name in ("dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin"):
             if getattr(self, name) <= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)} must be greater than 0")
@@ -96,3 +98,21 @@ class ControllerConfig:
                 f"push_hold_nm = {self.push_hold_nm} is below push_yield_nm = {self.push_yield_nm}; "
                 "the arm may push harder to hold than to yield, never less"
             )
+
+
+def _check_numbers(name: str, value, default) -> None:
+    """Check one field: numbers ≥ 0, of its default's shape, but gains of joints may be any number of them."""
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name} = {value!r} is not made of numbers; give numbers ≥ 0") from None
+    if np.isnan(numbers).any() or (numbers < 0).any():
+        raise InvalidInputError(f"{name} = {value} has a negative number or NaN; give numbers ≥ 0")
+    if name not in _MAY_BE_INFINITE and np.isinf(numbers).any():
+        raise InvalidInputError(f"{name} = {value} is infinite; give finite numbers ≥ 0")
+    if name in _PER_JOINT:
+        fits, wanted = numbers.ndim == 1 and numbers.size > 0, "one number a joint"
+    else:
+        fits, wanted = numbers.shape == np.shape(default), "(lowest, highest)" if np.shape(default) else "one number"
+    if not fits:
+        raise InvalidInputError(f"{name} = {value} has the wrong shape; give {wanted}")

@@ -1,0 +1,105 @@
+"""Three controllers by name, and what no configuration may say."""
+
+import math
+from dataclasses import asdict, replace
+
+import pytest
+
+from contactsafe import ControllerConfig, presets
+from contactsafe.errors import InvalidInputError
+
+
+def test_paper_has_every_printed_parameter_and_nothing_beyond_it():
+    config = presets.paper()
+    assert config.observer_gain == config.trigger_gain == 1.5
+    assert config.residual_threshold == 1.5
+    assert config.dwell_s == 0.05
+    assert config.K_pose == (40, 40, 40, 40, 30, 20, 10)
+    assert config.D_pose == (12, 12, 12, 12, 10, 8, 6)
+    assert config.contact_aware
+    assert config.cancel_tool_wrench
+    for name in ("release_s", "recover_s", "null_damping", "contact_damping", "approach_damping"):
+        assert getattr(config, name) == 0.0
+    assert config.push_yield_nm == config.push_hold_nm == math.inf
+
+
+def test_baseline_differs_from_the_paper_in_being_blind_alone():
+    paper, vices = asdict(presets.paper()), asdict(presets.vices())
+    assert {name for name in paper if paper[name] != vices[name]} == {"contact_aware"}
+    assert vices["contact_aware"] is False
+
+
+def test_safe_keeps_the_papers_posture_task_and_dwell():
+    paper, safe = presets.paper(), presets.safe()
+    for name in ("K_pose", "D_pose", "dwell_s", "contact_aware", "stiffness_range", "damping_range", "dt"):
+        assert getattr(safe, name) == getattr(paper, name)
+    assert safe.push_yield_nm < safe.push_hold_nm < math.inf
+
+
+@pytest.mark.parametrize("name", ["vices", "paper", "safe"])
+def test_preset_by_name(name):
+    assert presets.by_name(name) == getattr(presets, name)()
+
+
+def test_unknown_preset():
+    with pytest.raises(InvalidInputError) as caught:
+        presets.by_name("gentle")
+    assert str(caught.value) == "controller 'gentle' is unknown; choose from vices, paper, safe"
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"null_damping": -1.0}, "null_damping = -1.0 has a negative number or NaN; give numbers ≥ 0"),
+        ({"dwell_s": math.nan}, "dwell_s = nan has a negative number or NaN; give numbers ≥ 0"),
+        ({"K_pose": (1.0, -2.0)}, "K_pose = (1.0, -2.0) has a negative number or NaN; give numbers ≥ 0"),
+        ({"dt": 0.0}, "dt = 0.0 must be greater than 0"),
+        ({"observer_gain": 0.0}, "observer_gain = 0.0 must be greater than 0"),
+        ({"trigger_gain": 0}, "trigger_gain = 0 must be greater than 0"),
+        ({"residual_cutoff_hz": 0.0}, "residual_cutoff_hz = 0.0 must be greater than 0"),
+        ({"joint_margin": 0.0}, "joint_margin = 0.0 must be greater than 0"),
+        ({"stiffness_range": (20.0, 10.0)}, "stiffness_range = (20.0, 10.0) is empty; give (lowest, highest)"),
+        ({"damping_range": (5.0, 5.0)}, "damping_range = (5.0, 5.0) is empty; give (lowest, highest)"),
+        (
+            {"push_yield_nm": 5.0, "push_hold_nm": 4.0},
+            "push_hold_nm = 4.0 is below push_yield_nm = 5.0; "
+            "the arm may push harder to hold than to yield, never less",
+        ),
+    ],
+)
+def test_config_that_no_controller_can_mean(changed, text):
+    with pytest.raises(InvalidInputError) as caught:
+        replace(ControllerConfig(), **changed)
+    assert str(caught.value) == text
+
+
+def test_infinite_bounds_mean_none():
+    config = ControllerConfig(push_yield_nm=math.inf, push_hold_nm=math.inf, residual_cutoff_hz=math.inf)
+    assert config.residual_cutoff_hz == math.inf
+
+
+def test_bounds_may_be_infinite_and_nothing_else():
+    with pytest.raises(InvalidInputError) as caught:
+        ControllerConfig(dwell_s=math.inf)
+    assert str(caught.value) == "dwell_s = inf is infinite; give finite numbers ≥ 0"
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"dwell_s": "long"}, "dwell_s = 'long' is not made of numbers; give numbers ≥ 0"),
+        ({"dwell_s": None}, "dwell_s = None has a negative number or NaN; give numbers ≥ 0"),
+        ({"dwell_s": (0.1, 0.2)}, "dwell_s = (0.1, 0.2) has the wrong shape; give one number"),
+        ({"K_pose": 40.0}, "K_pose = 40.0 has the wrong shape; give one number a joint"),
+        ({"D_pose": ()}, "D_pose = () has the wrong shape; give one number a joint"),
+        ({"stiffness_range": 100.0}, "stiffness_range = 100.0 has the wrong shape; give (lowest, highest)"),
+        (
+            {"damping_range": (1.0, 2.0, 3.0)},
+            "damping_range = (1.0, 2.0, 3) has the wrong shape; give (lowest, highest)",
+        ),
+    ],
+)
+def test_what_is_no_number_or_too_many(changed, text):
+    with pytest.raises(InvalidInputError) as caught:
+        ControllerConfig(**changed)
+    assert str(caught.value) == text
