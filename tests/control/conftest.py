@@ -25,11 +25,12 @@ def quick_panda(panda):
 def six_joint_arm():
     """An arm of six joints as a user would bring it: MJCF, no facts, nothing of the Panda in it."""
     axes = ["0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1"]
-    body = '<inertial pos="0 0 .05" mass="0.3" diaginertia="1e-3 1e-3 1e-3"/><site name="tip" pos="0 0 .1"/>'
+    body = '<site name="tip" pos="0 0 .25"/>'
     for axis in reversed(axes):
         body = f"""<body pos="0 0 .18"><joint axis="{axis}" range="-2.5 2.5" armature="0.05"/>
-            <inertial pos="0.01 0.02 .09" mass="1.5" diaginertia="8e-3 8e-3 4e-3"/>{body}</body>"""
-    xml = f"""<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody>{body}</worldbody></mujoco>"""
+            <geom type="capsule" fromto="0 0 0 0.02 0.04 .15" size="0.03" mass="1.5"/>{body}</body>"""
+    xml = f"""<mujoco><compiler angle="radian"/><option timestep="0.001"/>
+        <default><geom contype="0" conaffinity="0"/></default><worldbody>{body}</worldbody></mujoco>"""
     return Arm(
         name="six",
         model=mujoco.MjModel.from_xml_string(xml),

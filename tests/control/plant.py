@@ -55,6 +55,8 @@ class Plant:
         """Apply a joint torque for one millisecond."""
         self.data.qfrc_applied[: self.arm.n] = torque
         mujoco.mj_step(self.model, self.data)
+        mujoco.mj_kinematics(self.model, self.data)  # or positions would be those before the step
+        mujoco.mj_comPos(self.model, self.data)
 
     def run(self, controller, target, ticks, wrench_ee=None, each=None):
         """Let a controller drive; `each` sees every output before it acts. Gives the last output."""
@@ -84,6 +86,12 @@ def reach(arm, offset):
     """Make the target that asks for the home pose moved by an offset, m, posture left at home."""
     target = hold(arm)
     return target._replace(pose=Pose(target.pose.position + np.asarray(offset), target.pose.quat))
+
+
+def wrist_meets_sphere(arm, gap, stiffness):
+    """Put a sphere on a spring of stiffness, N/m, beside the wrist of an arm at home, a gap of metres away in +y."""
+    wrist = Plant(arm).data.body("link5").xpos
+    return Plant(arm, model=with_sphere(arm, wrist + np.array([0.0, 0.16 + gap, 0.0]), stiffness))
 
 
 def with_sphere(arm, centre, stiffness, mass=1.0, radius=0.05):

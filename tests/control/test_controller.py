@@ -1,0 +1,165 @@
+"""The controller refuses at the door what it cannot mean, and says what to do."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from tests.control.plant import STIFFNESS, Plant, controller_at, hold, reach
+
+from contactsafe import Controller, Measurement, Pose, Target, presets
+from contactsafe.errors import InvalidInputError, UnreachableError
+
+
+@pytest.fixture(scope="module")
+def controller(panda):
+    return controller_at(panda, presets.safe())
+
+
+def refusal(call, *arguments, error=InvalidInputError):
+    with pytest.raises(error) as caught:
+        call(*arguments)
+    return str(caught.value)
+
+
+def test_arm_of_the_wrong_kind():
+    assert refusal(Controller, "panda") == "arm is str; give an Arm such as contactsafe.robots.panda()"
+
+
+def test_config_of_the_wrong_kind(panda):
+    text = "config is str; give a ControllerConfig such as contactsafe.presets.safe()"
+    assert refusal(Controller, panda, "safe") == text
+
+
+def test_step_before_reset(panda):
+    text = "the controller was not reset; call reset(q) with the measured joint positions first"
+    assert refusal(Controller(panda).step, Measurement(panda.home, np.zeros(7)), hold(panda)) == text
+
+
+@pytest.mark.parametrize(
+    ("q", "text"),
+    [
+        (np.zeros(6), "q has shape (6,); give 7 finite numbers"),
+        (np.full(7, np.nan), "q[0] = nan; every number must be finite"),
+        (
+            np.zeros(7),
+            "q[3] = 0.0000 rad is outside [-3.0718, -0.0698]; give measured joint positions in radians",
+        ),
+    ],
+)
+def test_reset_at_what_is_no_posture(panda, q, text):
+    assert refusal(Controller(panda).reset, q) == text
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"q": np.zeros(6)}, "q has shape (6,); give 7 numbers"),
+        ({"qd": 0.0}, "qd has shape (); give 7 numbers"),
+        ({"wrench_ee": np.zeros(3)}, "wrench_ee has shape (3,); give 6 numbers"),
+    ],
+)
+def test_measurement_of_the_wrong_shape(panda, controller, changed, text):
+    measurement = Measurement(panda.home, np.zeros(7))._replace(**changed)
+    assert refusal(controller.step, measurement, hold(panda)) == text
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"stiffness": 150.0}, "stiffness has shape (); give 6 finite numbers"),
+        ({"stiffness": np.full(6, np.nan)}, "stiffness[0] = nan; every number must be finite"),
+        (
+            {"stiffness": [150, 150, 4000, 150, 150, 150]},
+            "stiffness[2] = 4000 1/s² is outside [10, 1500]; scale it or widen ControllerConfig.stiffness_range",
+        ),
+        (
+            {"damping": [1, 20, 20, 20, 20, 20]},
+            "damping[0] = 1 1/s is outside [2, 120]; scale it or widen ControllerConfig.damping_range",
+        ),
+        ({"damping": "soft"}, "damping is str, not numbers; give 6 finite numbers"),
+        ({"posture": np.zeros(6)}, "posture has shape (6,); give 7 finite numbers"),
+        ({"pose": Pose(np.zeros(2), [1, 0, 0, 0])}, "pose.position has shape (2,); give 3 finite numbers"),
+        (
+            {"pose": Pose(np.array([0.4, 0.0, 0.4]), np.array([0.0, 2.0, 0.0, 0.0]))},
+            "pose.quat has length 2; give a unit quaternion w x y z (divide by its length)",
+        ),
+    ],
+)
+def test_target_that_means_nothing_leaves_the_last_one_in_force(panda, controller, changed, text):
+    controller.set_target(hold(panda))
+    before = controller.record["target"].copy()
+    target = hold(panda)._replace(**changed)
+    assert refusal(controller.step, Measurement(panda.home, np.zeros(7)), target) == text
+    assert controller.record["target"] == before
+
+
+def test_pose_out_of_reach_without_a_posture(panda, controller):
+    far = Target(Pose(np.array([3.0, 0.0, 0.5]), np.array([0.0, 1.0, 0.0, 0.0])), STIFFNESS)
+    text = refusal(controller.set_target, far, error=UnreachableError)
+    assert re.fullmatch(
+        r"pose at \[3\.000, 0\.000, 0\.500\] m was not reached: the nearest found is .* away, allowed is "
+        r"0\.1 mm and 0\.01°; move it towards the arm, turn it, or give another q_seed",
+        text,
+    )
+
+
+def test_pose_out_of_reach_with_a_posture_is_only_a_direction(panda, controller):
+    far = Target(Pose(np.array([3.0, 0.0, 0.5]), np.array([0.0, 1.0, 0.0, 0.0])), STIFFNESS, posture=panda.home)
+    assert np.isfinite(controller.step(Measurement(panda.home, np.zeros(7)), far).torque).all()
+
+
+def test_posture_comes_from_inverse_kinematics_where_none_is_given(panda):
+    controller = controller_at(panda, presets.safe())
+    target = reach(panda, [0.05, 0.1, -0.05])._replace(posture=None)
+    controller.set_target(target)
+    posture = controller.record["target"]["q_pose"]
+    assert np.linalg.norm(panda.tool_pose(posture).position - target.pose.position) < 1e-4
+    assert np.abs(posture - panda.home).max() < 1.0
+
+
+def test_damping_is_critical_where_none_is_given(panda, controller):
+    K = np.array([10.0, 25.0, 100.0, 400.0, 900.0, 1500.0])
+    controller.set_target(hold(panda)._replace(stiffness=K))
+    assert_allclose(controller.record["target"]["D_task"], 2 * np.sqrt(K), rtol=1e-15)
+
+
+def test_quaternion_sign_and_small_errors_of_length_do_not_matter(panda):
+    torques = []
+    for scale in (1.0, -1.0, 1.0009):
+        controller, target = controller_at(panda, presets.safe()), hold(panda)
+        target = target._replace(pose=Pose(target.pose.position, scale * target.pose.quat))
+        torques.append(controller.step(Measurement(panda.home, np.zeros(7)), target).torque)
+    assert_allclose(torques[1:], [torques[0]] * 2, rtol=0, atol=1e-9)
+
+
+def test_output_is_a_copy(panda):
+    controller = controller_at(panda, presets.safe())
+    first = controller.step(Measurement(panda.home, np.zeros(7)), hold(panda))
+    kept = first.torque.copy()
+    controller.step(Measurement(panda.home, np.full(7, 0.5)), hold(panda))
+    assert_array_equal(first.torque, kept)
+
+
+def test_default_is_safe(panda):
+    assert Controller(panda).config == presets.safe()
+
+
+def test_nothing_is_made_for_seven_joints_only(six_joint_arm):
+    """Six joints, a user's own model without facts, no null space: it holds, follows, and feels a push."""
+    arm = six_joint_arm
+    plant, controller = Plant(arm), controller_at(arm, presets.safe())
+    plant.run(controller, hold(arm), 200)
+    assert_allclose(plant.q, arm.home, rtol=0, atol=1e-9)
+    target = reach(arm, [0.03, -0.02, -0.03])._replace(posture=None)
+    out = plant.run(controller, target, 1500)
+    assert_allclose(out.error, 0, atol=1e-3)
+    assert out.torque.shape == out.residual.shape == (6,)
+    assert not out.contact.in_contact
+    body = int(arm.model.jnt_bodyid[3])
+    plant.push(body, (0.0, 20.0, 0.0))
+    out = plant.run(controller, target, 200)
+    assert out.contact.in_contact
+    assert out.contact.link >= 1
+    assert np.dot(out.contact.torque, plant.push_torque()) > 0
+    assert controller.record["params"]["K_pose"].tolist() == [40, 40, 40, 40, 30, 20]

@@ -1,0 +1,132 @@
+"""One tick, one result: whoever calls it, and whenever its state was saved."""
+
+import numba
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from tests.control.plant import Plant, controller_at, hold, reach, wrist_meets_sphere
+
+from contactsafe import Measurement, Pose, Target, presets
+from contactsafe.control.controller import Controller
+from contactsafe.control.records import CONTACT, controller_dtype
+from contactsafe.control.tick import control_tick, tick_at
+
+TICKS = 900
+
+
+@numba.njit
+def run_compiled(records, i, q, qd, wrench, torque):
+    c = records[i]
+    for k in range(q.shape[0]):
+        c.measurement.q[:] = q[k]
+        c.measurement.qd[:] = qd[k]
+        c.measurement.wrench_ee[:] = wrench[k]
+        c.measurement.has_wrench = 1
+        control_tick(c)
+        torque[k] = c.output.torque
+
+
+@pytest.fixture(scope="module")
+def recording(panda):
+    """Measurements of a collision, the target that led to it, and the torques that Controller.step gave."""
+    plant = wrist_meets_sphere(panda, 0.04, 5000.0)
+    controller, rng = controller_at(panda, presets.safe()), np.random.default_rng(5)
+    target = reach(panda, [0.0, 0.1, 0.02])._replace(stiffness=rng.uniform(50, 300, 6))
+    q, qd, torque, modes = [], [], [], []
+    wrench = rng.normal(size=(TICKS, 6))
+    for k in range(TICKS):
+        q.append(plant.q)
+        qd.append(plant.qd)
+        out = controller.step(Measurement(q[-1], qd[-1], wrench[k]), target)
+        torque.append(out.torque)
+        modes.append(out.contact.in_contact)
+        plant.step(out.torque)
+    assert 0 < sum(modes) < TICKS
+    return np.array(q), np.array(qd), wrench, np.array(torque), target
+
+
+def prepared(panda, target, count=3):
+    """Give records of `count` controllers reset at home, and the controllers, which keep their models alive."""
+    records = np.zeros(count, dtype=controller_dtype(panda.n))
+    controllers = [controller_at(panda, presets.safe(), records=records, index=i) for i in range(count)]
+    for controller in controllers:
+        controller.set_target(target)
+    return records, controllers
+
+
+def test_compiled_loop_gives_the_same_bits(panda, recording):
+    q, qd, wrench, torque, target = recording
+    records, _alive = prepared(panda, target)
+    again = np.zeros_like(torque)
+    run_compiled(records, 1, q, qd, wrench, again)
+    assert_array_equal(again, torque)
+
+
+def test_tick_at_gives_the_same_bits(panda, recording):
+    q, qd, wrench, torque, target = recording
+    records, _alive = prepared(panda, target)
+    for k in range(TICKS):
+        measurement = records[2]["measurement"]
+        measurement["q"], measurement["qd"], measurement["wrench_ee"] = q[k], qd[k], wrench[k]
+        measurement["has_wrench"] = 1
+        tick_at(records, 2)
+        assert_array_equal(records[2]["output"]["torque"], torque[k])
+
+
+def test_neighbours_in_an_array_are_left_alone(panda, recording):
+    q, qd, wrench, torque, target = recording
+    records, _alive = prepared(panda, target)
+    before = records.copy()
+    run_compiled(records, 1, q, qd, wrench, np.zeros_like(torque))
+    assert records[0].tobytes() == before[0].tobytes()
+    assert records[2].tobytes() == before[2].tobytes()
+
+
+@pytest.mark.parametrize("saved_at", [1, 200, 450])
+def test_saved_state_goes_on_with_the_same_bits(panda, recording, saved_at):
+    """State and target are copied; everything else another controller has of its own."""
+    q, qd, wrench, torque, target = recording
+    first, _alive = prepared(panda, target)
+    run_compiled(first, 0, q[:saved_at], qd[:saved_at], wrench[:saved_at], torque[:saved_at].copy())
+    state, kept = first[0]["state"].copy(), first[0]["target"].copy()
+    second, _too = prepared(panda, hold(panda))
+    second[0]["state"], second[0]["target"] = state, kept
+    rest = np.zeros_like(torque[saved_at:])
+    run_compiled(second, 0, q[saved_at:], qd[saved_at:], wrench[saved_at:], rest)
+    assert_array_equal(rest, torque[saved_at:])
+
+
+def test_reset_forgets_everything(panda, recording):
+    q, qd, wrench, torque, target = recording
+    records, controllers = prepared(panda, target)
+    run_compiled(records, 0, q, qd, wrench, np.zeros_like(torque))
+    controllers[0].reset(panda.home)
+    controllers[0].set_target(target)
+    again = np.zeros_like(torque)
+    run_compiled(records, 0, q, qd, wrench, again)
+    assert_array_equal(again, torque)
+
+
+def test_torque_stays_within_its_limits_under_random_targets(panda):
+    """20 000 ticks, a target every 17 that has nothing to do with where the arm is, pushes besides."""
+    rng = np.random.default_rng(7)
+    plant, controller = Plant(panda), Controller(panda, presets.safe())
+    controller.reset(panda.home)
+    before = panda.dynamics(panda.home, np.zeros(7))["g"]
+    contacts = 0
+    for k in range(20000):
+        if k % 17 == 0:
+            quat = rng.normal(size=4)
+            pose = Pose(rng.uniform([0.2, -0.6, 0.0], [0.7, 0.6, 0.8]), quat / np.linalg.norm(quat))
+            posture = rng.uniform(panda.q_min, panda.q_max)
+            target = Target(pose, rng.uniform(10, 1500, 6), rng.uniform(2, 120, 6), posture)
+        if k % 500 == 0:
+            plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
+        out = controller.step(Measurement(plant.q, plant.qd), target)
+        assert (np.abs(out.torque) <= panda.tau_max).all()
+        assert np.abs(out.torque - before).max() <= 1.0
+        before = out.torque
+        contacts += controller.record["state"]["mode"] == CONTACT
+        plant.step(out.torque)
+    assert contacts > 1000
+    assert out.fault == "none"
