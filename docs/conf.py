@@ -2,10 +2,16 @@
 
 import inspect
 import os
+import pathlib
 import re
+import sys
 
 # Compiled functions are documented from their Python source.
 os.environ["NUMBA_DISABLE_JIT"] = "1"
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+
+import controller_tables
 
 import contactsafe
 
@@ -70,6 +76,13 @@ def _skip(app, what, name, obj, skip, options):
     return True if passed_on else None
 
 
+def _fill_tables(app, docname, source):
+    """Write the tables that come from the code."""
+    if docname == "concepts/control":
+        source[0] = controller_tables.fill(source[0])
+
+
 def setup(app):
+    app.connect("source-read", _fill_tables)
     app.connect("autodoc-process-docstring", _plain_text, priority=100)
     app.connect("autodoc-skip-member", _skip)
