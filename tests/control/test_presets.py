@@ -95,7 +95,7 @@ def test_bounds_may_be_infinite_and_nothing_else():
         ({"stiffness_range": 100.0}, "stiffness_range = 100.0 has the wrong shape; give (lowest, highest)"),
         (
             {"damping_range": (1.0, 2.0, 3.0)},
-            "damping_range = (1.0, 2.0, 3) has the wrong shape; give (lowest, highest)",
+            "damping_range = (1.0, 2.0, 3.0) has the wrong shape; give (lowest, highest)",
         ),
     ],
 )
