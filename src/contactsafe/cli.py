@@ -18,7 +18,7 @@ from contactsafe.control import presets
 from contactsafe.errors import ContactSafeError, InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
-from contactsafe.learning.bundle import Bundle, shipped_bundle
+from contactsafe.learning.bundle import MANIFEST, Bundle, digest, shipped_bundle
 
 Controllers = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
 
@@ -122,7 +122,7 @@ def evaluate(
 
     from contactsafe.envs.config import WipingConfig
     from contactsafe.envs.wiping import WipingVectorEnv
-    from contactsafe.learning.evaluation import evaluate_policy
+    from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
     from contactsafe.learning.policy import Policy
 
     presets.by_name(controller)
@@ -131,12 +131,11 @@ def evaluate(
     if seed < 0:
         raise InvalidInputError(f"seed = {seed}; give 0 or more")
     loaded = Bundle.load(bundle or shipped_bundle())
-    env = gymnasium.make_vec(
-        "contactsafe/Wiping-v0", num_envs=min(16, episodes), config=WipingConfig(controller=controller)
-    )
+    side_by_side = max(n for n in range(1, 17) if episodes % n == 0)
+    env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=side_by_side, config=WipingConfig(controller=controller))
     policy = Policy(loaded, cast(WipingVectorEnv, env).camera_homography)
     with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
-        results = evaluate_policy(policy, env, episodes, seed, on_episode=lambda record: bar.update())
+        results = evaluate_policy(policy, env, episodes, HELD_OUT_SEED + seed, on_episode=lambda record: bar.update())
     env.close()
     records = results.pop("records")
     if json:
@@ -252,7 +251,7 @@ def _facts(command: str, config: ExperimentConfig, bundle: Bundle, seconds: floa
         "command": f"{command} --trials {config.trials} --seed {config.seed} --controllers {names}",
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(range(config.seed, config.seed + config.trials)),
-        "bundle_sha256": {name: entry["sha256"] for name, entry in bundle.manifest["files"].items()},
+        "bundle_sha256": digest((Path(bundle.folder) / MANIFEST).read_bytes()),
         "push_s": PUSH_S,
         "seconds": round(seconds, 1),
     }

@@ -9,6 +9,7 @@ import os
 import pathlib
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ import numba
 import numpy as np
 
 _KEPT_VERSIONS = 4
+_IN_USE_S = 86400.0  # a version started within the last day may still be at work
 _ROOMS = ("robot", "control", "sim", "envs")  # where compiled functions call each other across files
 
 
@@ -43,6 +45,8 @@ def _cache_folder() -> str:
         return tempfile.mkdtemp(prefix="contactsafe-")
     versions = sorted((path for path in root.iterdir() if path.is_dir()), key=lambda path: -path.stat().st_mtime)
     for old in versions[_KEPT_VERSIONS:]:
+        if time.time() - old.stat().st_mtime < _IN_USE_S:
+            continue
         shutil.rmtree(old, ignore_errors=True)
     return str(folder)
 

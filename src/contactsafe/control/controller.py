@@ -162,7 +162,6 @@ class Controller:
             )
         if target is not self._last_target:
             self.set_target(target)
-            self._last_target = target
         self._set_measurement(measurement)
         tick_at(self._records, self._index)
         return self._output()
@@ -181,6 +180,7 @@ class Controller:
             posture = self.arm.joint_vector(target.posture, "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
+        self._last_target = target
 
     def _gain(self, value, name: str, unit: str, allowed: tuple[float, float]) -> np.ndarray:
         gain = finite_array(value, (6,), name)

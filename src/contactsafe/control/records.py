@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from contactsafe.control.config import ControllerConfig
+from contactsafe.control.laws import observer_gain
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.dynamics import dynamics_dtype, handle_dtype
 
@@ -152,9 +153,9 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
         "friction_compensation",
     ):  # fmt: skip
         params[name] = getattr(config, name)
-    params["trigger_share"] = 1.0 - math.exp(-config.trigger_gain * dt)
-    params["observer_share"] = 1.0 - math.exp(-config.observer_gain * dt)
-    params["lowpass_share"] = 1.0 - math.exp(-2.0 * math.pi * config.residual_cutoff_hz * dt)
+    params["trigger_share"] = observer_gain(config.trigger_gain, dt)
+    params["observer_share"] = observer_gain(config.observer_gain, dt)
+    params["lowpass_share"] = observer_gain(2.0 * math.pi * config.residual_cutoff_hz, dt)
     params["stiffness_min"], params["stiffness_max"] = config.stiffness_range
     params["damping_min"], params["damping_max"] = config.damping_range
     params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt

@@ -7,7 +7,7 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose
 from contactsafe.sim.camera import render_mask
-from contactsafe.sim.stepping import run_ticks
+from contactsafe.sim.stepping import run_ticks, tool_position
 from contactsafe.sim.whiteboard import INK
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
@@ -93,7 +93,7 @@ def step_tasks(
     for i in range(start, stop):
         apply_action(controllers[i], limits, q_min, q_max, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
-        ink, distance = nearest_ink(cells[i], plants[i].origin, plants[i].cell, controllers[i].output.position)
+        ink, distance = nearest_ink(cells[i], plants[i].origin, plants[i].cell, tool_position(plants[i]))
         score(tasks[i], reports[i], rewards, ink, distance)
         tasks[i].steps += 1
         observe(plants[i], controllers[i], cells[i], camera, tasks[i], masks[i])

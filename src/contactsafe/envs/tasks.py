@@ -37,7 +37,7 @@ class WipingTasks:
         self,
         config: WipingConfig | None = None,
         n: int = 1,
-        seed: int | None = None,
+        seed: int | Sequence[int] | None = None,
         worlds: Sequence[WorldConfig] | None = None,
     ):
         self.config = config or WipingConfig()

@@ -8,10 +8,11 @@ from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Act, Progress, Run, holding, run_policy
+from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
 
 QUESTION = (
-    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes: how far does the tool stray?"
+    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes (K1 = 75 1/s², a soft tool): "
+    "how far does the tool stray?"
 )
 PUSH_N = 25.0
 PUSH_S = (0.5, 2.0)
@@ -64,13 +65,13 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
     config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS))
-    tasks = WipingTasks(config, len(seeds), seeds[0])
+    tasks = WipingTasks(config, len(seeds), list(seeds))
     x, y, z = tasks.config.world.board.centre
     start = np.array([x, y, z + _HOLD_HEIGHT])
     if mode == "wiping":
         start[2] = z + 0.001
     for i, seed in enumerate(seeds):
-        tasks.reset(i, np.random.default_rng(seed), start=start)
+        tasks.reset(i, held_out(seed), start=start)
         if link is not None:
             tasks.worlds.push(i, f"link{link}", PUSH_POINTS[link], push_force(seed, link), *PUSH_S)
     act = holding() if mode == "holding" else strokes(tasks)

@@ -7,10 +7,10 @@ import numpy as np
 from contactsafe.envs.action import DOWN
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
+from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Progress, run_policy
-from contactsafe.learning.policy import Policy
+from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.shape import arm_capsules
 from contactsafe.sim.config import Obstacle, WorldConfig, bottle, thrust_meter
@@ -22,8 +22,8 @@ QUESTION = (
 OBSTACLES: dict[str, Callable[..., Obstacle]] = {"bottle": bottle, "thrust meter": thrust_meter}
 OBJECT_CENTRE, OBJECT_SIZE = (0.5, -0.24), (0.10, 0.06)
 DURATION_S = 10.0
-STEADY_S = 1.0
-"""The last part of a run, over which steady figures are medians."""
+STEADY_S = 2.0
+"""The last part of a run, over which steady figures are means: who bounces is not let off between two blows."""
 
 _FOREARM_LINK = 5
 _HIT_AT = (-0.12, -0.06)  # range of the tool's y at which the forearm meets the obstacle, m
@@ -57,15 +57,16 @@ def joint_safety(bundle, config: ExperimentConfig, progress: Progress | None = N
 
 def _collide(bundle, make, controller: str, seeds: range):
     probe = WipingTasks(WipingConfig())
-    rngs = [np.random.default_rng(seed) for seed in seeds]
+    rngs = [held_out(seed) for seed in seeds]
     worlds = [WorldConfig(obstacles=(make(held_before_forearm(probe, make, rng)),)) for rng in rngs]
-    tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), seeds[0], worlds)
+    tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds), worlds)
+    x, y, z = tasks.config.world.board.centre
     for i, rng in enumerate(rngs):
-        tasks.reset(i, rng)
+        # On the left half of the board: never beyond the obstacle to begin with.
+        tasks.reset(i, rng, start=(x + rng.uniform(-0.1, 0.1), y + rng.uniform(0.0, 0.1), z + 0.05))
         tasks.worlds.boards[i].place_object(OBJECT_CENTRE, OBJECT_SIZE)
         tasks.observe(i)
-    policy = Policy(bundle, tasks.worlds.homography)
-    return tasks, run_policy(tasks, policy.act, round(DURATION_S * 60), stop_when_clean=False)
+    return tasks, run_policy(tasks, policy_for(bundle, tasks).act, round(DURATION_S * 60), stop_when_clean=False)
 
 
 def held_before_forearm(tasks: WipingTasks, make: Callable[..., Obstacle], rng: np.random.Generator) -> tuple:
@@ -89,7 +90,9 @@ def held_before_forearm(tasks: WipingTasks, make: Callable[..., Obstacle], rng: 
 def forearm(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, float]:
     """Give middle, (3,) m, and radius, m, of the forearm's thickest capsule at q (n,) rad."""
     if arm.facts is None or arm.tool is None:
-        raise ValueError("the arm has no facts")
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no facts to draw a forearm from; give contactsafe.robots.panda()"
+        )
     starts, ends, radii, links = arm_capsules(arm.facts, arm.tool, q[None])
     of_link = np.flatnonzero(np.asarray(links) == _FOREARM_LINK)
     thickest = of_link[np.argmax(radii[of_link])]
@@ -115,10 +118,10 @@ def contact_metrics(trace: np.ndarray) -> dict[str, float]:
     tau, residual = np.abs(trace["tau_arm"]).max(axis=1), np.abs(trace["residual"]).max(axis=1)
     first = int(np.argmax(touching))
     found = trace["link"][first:] > 0
-    detect = float(np.argmax(found)) if found.any() else float("nan")
+    detect = float(np.argmax(found)) if found.any() and not found[0] else float("nan")
     switches = int(np.count_nonzero(np.diff(trace["mode"])))
     values = (
-        force.max(), np.median(force[steady]), force.sum() / 1000.0, tau.max(), np.median(tau[steady]), residual.max(),
-        np.median(residual[steady]), detect, np.linalg.norm(trace["tool_force"], axis=1).max(), switches,
+        force.max(), force[steady].mean(), force.sum() / 1000.0, tau.max(), tau[steady].mean(), residual.max(),
+        residual[steady].mean(), detect, np.linalg.norm(trace["tool_force"], axis=1).max(), switches,
     )  # fmt: skip
     return {name: float(value) for name, value in zip(names, values, strict=True)} | {"met": 1.0}

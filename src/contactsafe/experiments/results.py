@@ -29,11 +29,12 @@ class Spread:
     """A figure over seeds.
 
     Attributes:
-        median, p5, p95, min, max: of the trials where the figure exists.
+        median, mean, p5, p95, min, max: of the trials where the figure exists.
         n: how many those are.
     """
 
     median: float
+    mean: float
     p5: float
     p95: float
     min: float
@@ -110,9 +111,10 @@ def spread(values: list[float]) -> Spread:
     numbers = np.array([value for value in values if np.isfinite(value)])
     if numbers.size == 0:
         nan = float("nan")
-        return Spread(nan, nan, nan, nan, nan, 0)
+        return Spread(nan, nan, nan, nan, nan, nan, 0)
     p5, median, p95 = np.percentile(numbers, [5, 50, 95])
-    return Spread(float(median), float(p5), float(p95), float(numbers.min()), float(numbers.max()), int(numbers.size))
+    least, most = float(numbers.min()), float(numbers.max())
+    return Spread(float(median), float(numbers.mean()), float(p5), float(p95), least, most, int(numbers.size))
 
 
 def _plain(value: Any) -> Any:

@@ -6,8 +6,7 @@ from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Progress, run_policy
-from contactsafe.learning.policy import Policy
+from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
 
 QUESTION = (
     "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"
@@ -28,13 +27,13 @@ def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = No
     recordings: list[Recording] = []
     for name in config.controllers:
         for seeds in config.batches():
-            tasks = WipingTasks(WipingConfig(controller=name), len(seeds), seeds[0])
+            tasks = WipingTasks(WipingConfig(controller=name), len(seeds), list(seeds))
             for i, seed in enumerate(seeds):
-                tasks.reset(i, np.random.default_rng(seed))
-            policy = Policy(bundle, tasks.worlds.homography)
+                tasks.reset(i, held_out(seed))
+            policy = policy_for(bundle, tasks)
             run = run_policy(tasks, policy.act, tasks.step_limit, stop_when_clean=True)
             for i, seed in enumerate(seeds):
-                trials.append(Trial(SCENARIO, name, seed, wiping_metrics(run.traces[i], bool(tasks.tasks["clean"][i]))))
+                trials.append(Trial(SCENARIO, name, seed, wiping_metrics(run.traces[i], run.clean[i])))
             if config.seed in seeds:
                 recordings.append(run.recording(0, SCENARIO, name, config.seed))
             tasks.worlds.close()
@@ -54,6 +53,7 @@ def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
     touching = force > _TOUCHING_N
     return {
         "ink_removed": float(1.0 - trace["ink_left"][-1]),
+        "clean": float(clean),
         "time_s": float(trace["time"][-1]) if clean else float("nan"),
         "tool_force_peak_n": float(force.max()),
         "tool_force_median_n": float(np.median(force[touching])) if touching.any() else float("nan"),

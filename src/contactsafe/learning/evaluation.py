@@ -8,6 +8,10 @@ CONTACT_N = 0.5
 """Tool force above which the pad counts as pressed, N (issue 2: what it takes to erase)."""
 
 
+HELD_OUT_SEED = 1_000_003
+"""Added to the seeds of boards that are never trained on."""
+
+
 def step_values(info, done, key):
     """Read one number per environment from a vector environment's info, the last of an episode where it ended.
 
@@ -46,7 +50,8 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
     Returns:
         episodes; success: share that ended with a clean board; ink_removed_mean, _median, _p10: share of the ink, 0..1;
         time_mean_s: length of an episode; time_to_clean_median_s: of the successful, NaN if none; peak_force_median_n,
-        _p95_n, _max_n: largest tool force of an episode; contact_force_median_n: of all steps in contact;
+        _p95_n, _max_n: largest tool force of an episode; contact_force_median_n: of all steps in contact, each
+        counted with its largest force;
         contact_share: of all steps; return_mean; records: a dict per episode, by environment and then by time.
 
     Raises:

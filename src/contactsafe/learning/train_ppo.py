@@ -25,14 +25,11 @@ from contactsafe.learning.checkpoints import (
     save_checkpoint,
     write_json,
 )
-from contactsafe.learning.evaluation import evaluate_policy
+from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.perception import Perception, open_session
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling
-
-EVALUATION_SEED = 1_000_003
-"""Added to the seed for boards that are never trained on."""
 
 SESSION_FIELDS = (
     "out",
@@ -159,8 +156,12 @@ def train_ppo(config, make_env=None):
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
         "training": {
-            "ppo": plain(config),
-            "vae": {key: value for key, value in vae.items() if not key.startswith("latent_")},
+            "ppo": _portable(plain(config)),
+            "vae": {
+                key: _portable(value) if key == "config" else value
+                for key, value in vae.items()
+                if not key.startswith("latent_")
+            },
             "steps": model.num_timesteps,
             "minutes": round(recorder.minutes(), 1),
         },
@@ -173,6 +174,11 @@ def train_ppo(config, make_env=None):
         description["results"] = _evaluate(folder, make_env, config)
         export_bundle(folder, encoder, layers, scaling, description, force=True)
     return description["results"]
+
+
+def _portable(settings):
+    """Leave out what names folders of this machine, or this session only."""
+    return {key: value for key, value in settings.items() if key not in ("vae", "out", "resume")}
 
 
 def _load_encoder(folder):
@@ -233,7 +239,7 @@ def _evaluate(folder, make_env, config):
     try:
         policy = Policy(folder, _homography(env))
         with tqdm(total=config.evaluate_episodes, desc="held-out boards", unit="episode") as bar:
-            seed = config.seed + EVALUATION_SEED
+            seed = config.seed + HELD_OUT_SEED
             results = evaluate_policy(
                 policy, env, config.evaluate_episodes, seed, config.rate_hz, lambda _: bar.update()
             )

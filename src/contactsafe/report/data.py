@@ -26,6 +26,8 @@ class Spread(Protocol):
     @property
     def median(self) -> float: ...  # noqa: D102
     @property
+    def mean(self) -> float: ...  # noqa: D102
+    @property
     def p5(self) -> float: ...  # noqa: D102
     @property
     def p95(self) -> float: ...  # noqa: D102

@@ -16,6 +16,7 @@ class Aim:
         above: smallest value allowed, in the row's unit.
         share: largest multiple of the baseline's median allowed.
         at_least_share: smallest multiple of the baseline's median allowed.
+        baseline_above: judge only where the baseline's median passes this, in the row's unit.
         worst: judge the largest value over seeds.
         scenarios: words of which one must stand in the scenario's name; empty for all.
     """
@@ -24,6 +25,7 @@ class Aim:
     above: float | None = None
     share: float | None = None
     at_least_share: float | None = None
+    baseline_above: float | None = None
     worst: bool = False
     scenarios: tuple[str, ...] = ()
 
@@ -32,12 +34,16 @@ class Aim:
         parts = []
         if self.above is not None and self.below is not None:
             parts.append(f"{self.above:g} to {self.below:g} {unit}")
+        elif self.above is not None:
+            parts.append(f"over {self.above:g} {unit}")
         elif self.below is not None:
             parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
         if self.share is not None:
             parts.append(f"at most {_fraction(self.share)} of {BASELINE}")
         if self.at_least_share is not None:
             parts.append(f"at least {_fraction(self.at_least_share)} of {BASELINE}")
+        if self.baseline_above is not None:
+            parts.append(f"where {BASELINE} passes {self.baseline_above:g}")
         return " ".join(parts)
 
     def judge(self, value: Spread | None, baseline: Spread | None, scale: float) -> bool | None:
@@ -46,6 +52,8 @@ class Aim:
             return None
         found = scale * (value.max if self.worst else value.median)
         of_baseline = ratio(value, baseline)
+        if self.baseline_above is not None and not (baseline and scale * baseline.median > self.baseline_above):
+            return None
         if (self.share is not None or self.at_least_share is not None) and not math.isfinite(of_baseline):
             return None
         return (
@@ -67,6 +75,7 @@ class Row:
         scale: from the trials' unit to the one shown.
         main: also shown in the summary and in the terminal.
         aim: what it should be.
+        mean: show and judge the mean over seeds in place of the median: a few boards left dirty must show.
     """
 
     metric: str
@@ -75,6 +84,7 @@ class Row:
     scale: float = 1.0
     main: bool = False
     aim: Aim | None = None
+    mean: bool = False
 
     def aim_in(self, scenario: str) -> Aim | None:
         """Give the aim, where it applies to this scenario."""
@@ -104,11 +114,15 @@ class Line:
 
 TITLES = {"task-safety": "Task safety", "joint-safety": "Joint safety", "disturbance": "Disturbance"}
 
-_PUSHED = Aim(below=10.0, scenarios=("link 4", "link 5"))
+_PUSHED = Aim(below=10.0, baseline_above=25.0, scenarios=("link 4", "link 5"))
 
 CATALOGUE: dict[str, tuple[Row, ...]] = {
     "task-safety": (
-        Row("ink_removed", "ink removed", "%", 100.0, main=True, aim=Aim(at_least_share=0.95)),
+        Row(
+            "ink_removed", "ink removed, mean", "%", 100.0, main=True,
+            aim=Aim(above=80.0, at_least_share=0.95), mean=True,
+        ),
+        Row("clean", "boards wiped clean, mean", "%", 100.0, main=True, mean=True),
         Row("time_s", "time to a clean board", "s"),
         Row("tool_force_peak_n", "tool force, peak", "N", main=True, aim=Aim(below=40.0, worst=True)),
         Row("tool_force_median_n", "tool force, median in contact", "N", main=True, aim=Aim(below=10.0, above=2.0)),
@@ -120,11 +134,11 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("impulse_ns", "impulse of the contact", "N s"),
         Row(
             "tau_steady_nm", "external joint torque, steady", "N m", main=True,
-            aim=Aim(below=5.0),
+            aim=Aim(below=5.0, baseline_above=8.0),
         ),
         Row("tau_peak_nm", "external joint torque, peak", "N m"),
-        Row("residual_steady_nm", "observer's residual, steady", "N m"),
-        Row("residual_peak_nm", "observer's residual, peak", "N m"),
+        Row("residual_steady_nm", "residual compensated by this controller, steady", "N m"),
+        Row("residual_peak_nm", "residual compensated by this controller, peak", "N m"),
         Row("detect_ms", "contact to its detection", "ms"),
         Row("met", "runs that met the obstacle", "%", 100.0),
     ),
@@ -142,6 +156,23 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
 _UNITS = {"n": "N", "nm": "N m", "ns": "N s", "mm": "mm", "ms": "ms", "s": "s"}
 
 
+@dataclass(frozen=True)
+class _Centred:
+    """A spread whose middle is its mean, for rows that say so."""
+
+    median: float
+    mean: float
+    p5: float
+    p95: float
+    min: float
+    max: float
+    n: int
+
+    @classmethod
+    def on_mean(cls, spread: Spread) -> "_Centred":
+        return cls(spread.mean, spread.mean, spread.p5, spread.p95, spread.min, spread.max, spread.n)
+
+
 def lines(experiment: Experiment, main_only: bool = False) -> list[Line]:
     """Fill in all rows of an experiment for which there is a figure, scenario by scenario.
 
@@ -154,6 +185,8 @@ def lines(experiment: Experiment, main_only: bool = False) -> list[Line]:
         rows = CATALOGUE.get(experiment.name) or _rows_of_unknown(by_controller)
         for row in rows:
             values = {name: metrics[row.metric] for name, metrics in by_controller.items() if row.metric in metrics}
+            if row.mean:
+                values = {name: _Centred.on_mean(spread) for name, spread in values.items()}
             if values and (row.main or not main_only):
                 out.append(Line(scenario, row, values))
     return out

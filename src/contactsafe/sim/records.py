@@ -5,6 +5,7 @@ import numpy as np
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.mjcf import TOOL_SITE
 from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig
 
 _f = np.float64
@@ -36,7 +37,10 @@ def plant_dtype(n: int) -> np.dtype:
     """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
     return np.dtype(
         [(name, np.uintp) for name in ("model", "data", *_VIEWED)]
-        + [(name, _i) for name in ("nv", "nbody", "ngeom", "nsensordata", "n_obstacles", "delay_ticks", "tick")]
+        + [
+            (name, _i)
+            for name in ("nv", "nbody", "ngeom", "nsensordata", "tcp_site", "n_obstacles", "delay_ticks", "tick")
+        ]
         + [(f"adr_{name}", _i) for name in _SENSORS]
         + [
             ("adr_obstacles", _i, (MAX_OBSTACLES,)),
@@ -112,6 +116,7 @@ def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, conf
         plant[name] = getattr(data, name).ctypes.data
     for name in ("nv", "nbody", "ngeom", "nsensordata"):
         plant[name] = getattr(model, name)
+    plant["tcp_site"] = model.site(TOOL_SITE).id
     plant["delay_ticks"] = config.plant.torque_delay_ticks
     names = {model.sensor(i).name: model.sensor_adr[i] for i in range(model.nsensor)}
     for name in _SENSORS:

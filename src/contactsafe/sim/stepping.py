@@ -35,7 +35,7 @@ def run_ticks(plant, controller, cells, noise, ticks, report, trace):
         control_tick(controller)
         act(plant, controller, noise[k])
         mj_step(plant.model, plant.data)
-        _measure(plant, controller, cells, report)
+        _measure(plant, cells, report)
         if trace.shape[0] > 0:
             _record(plant, controller, trace[k])
         plant.tick += 1
@@ -115,6 +115,18 @@ def push_torque(plant, n):
 
 
 @compiled
+def tool_position(plant):
+    """Give where the plant's tool point is, world, (3,), m."""
+    return view2(plant.site_xpos, plant.tcp_site + 1, 3)[plant.tcp_site]
+
+
+@compiled
+def tool_rotation(plant):
+    """Give the axes of the plant's tool, world, (3, 3)."""
+    return view2(plant.site_xmat, plant.tcp_site + 1, 9)[plant.tcp_site].reshape(3, 3)
+
+
+@compiled
 def pad_force(plant, out):
     """Fill the force of board and table on the pad by the simulator, world axes, (3,), N."""
     data = view1(plant.sensordata, plant.nsensordata)
@@ -137,7 +149,7 @@ def obstacle_force(plant):
 
 
 @compiled
-def _measure(plant, controller, cells, report):
+def _measure(plant, cells, report):
     force = np.empty(3)
     pad_force(plant, force)
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
@@ -154,7 +166,7 @@ def _measure(plant, controller, cells, report):
         report.contact_ticks += 1
     if plant.tick % _ERASE_EVERY == 0 and size > plant.press_n:
         report.erased += erase_under_pad(
-            cells, plant.origin[0], plant.origin[1], plant.cell, controller.output.position, controller.output.rotation,
+            cells, plant.origin[0], plant.origin[1], plant.cell, tool_position(plant), tool_rotation(plant),
             plant.pad_half[0], plant.pad_half[1],
         )  # fmt: skip
 
@@ -166,7 +178,7 @@ def _record(plant, controller, row):
     row.time = plant.tick * controller.params.dt
     row.q[:] = view1(plant.qpos, n)
     row.torque[:] = out.torque
-    row.position[:] = out.position
+    row.position[:] = tool_position(plant)
     row.error[:] = out.error
     row.wrench_ee[:] = controller.measurement.wrench_ee
     row.residual[:] = out.residual
@@ -179,7 +191,7 @@ def _record(plant, controller, row):
         row.obstacle_position[index, :] = xpos[plant.obstacle_bodies[index]]
     row.tau_arm[:] = view1(plant.qfrc_constraint, n)
     row.tau_arm[:] += push_torque(plant, n)
-    row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, out.position))
+    row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, tool_position(plant)))
 
 
 @compiled

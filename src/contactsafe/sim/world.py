@@ -23,6 +23,9 @@ from contactsafe.sim.whiteboard import INK, Whiteboard
 POLICY_RATE_HZ = 60
 """Rate of the policy; 1 kHz does not divide by it, so its steps last 17, 17 and 16 ticks in turn."""
 
+TICK_S = 0.001
+"""Time step of plant and controller, s."""
+
 MAX_TICKS = 17
 
 
@@ -63,7 +66,8 @@ class Worlds:
         world: plant, sensors, board, camera, obstacles; one for all, or one for each (same board and camera).
         controller: a preset or another configuration, the same for all.
         n: how many.
-        seed: of the sensors' noise and bias; world i draws from its own stream.
+        seed: of the sensors' noise and bias; world i draws from its own stream. One for all, or one for each: then
+            what a world does depends on nothing but its own.
 
     Attributes:
         plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `report_dtype` records, (n,).
@@ -81,10 +85,12 @@ class Worlds:
         world: WorldConfig | Sequence[WorldConfig] | None = None,
         controller: ControllerConfig | None = None,
         n: int = 1,
-        seed: int | None = None,
+        seed: int | Sequence[int] | None = None,
     ):
         self.arm, self.n = arm, n
         self.configs = _one_each(world, n)
+        if controller is not None and controller.dt != TICK_S:
+            raise InvalidInputError(f"controller dt = {controller.dt} s; simulated worlds tick every {TICK_S} s")
         self.config = self.configs[0]
         self.models = _plants(arm, self.configs)
         self.datas = [mujoco.MjData(model) for model in self.models]
@@ -107,9 +113,12 @@ class Worlds:
         self._threads = ThreadPoolExecutor(min(n, os.cpu_count() or 1)) if n > 1 else None
         self.seed(seed)
 
-    def seed(self, seed: int | None) -> None:
-        """Start the worlds' noise anew."""
-        streams = np.random.SeedSequence(seed).spawn(self.n)
+    def seed(self, seed: int | Sequence[int] | None) -> None:
+        """Start the worlds' noise anew, from one seed for all or one for each."""
+        if seed is None or isinstance(seed, int | np.integer):
+            streams = np.random.SeedSequence(seed).spawn(self.n)
+        else:
+            streams = [np.random.SeedSequence(one) for one in seed]
         self.rngs = [np.random.Generator(np.random.SFC64(stream)) for stream in streams]
 
     def reset(self, i: int, q) -> None:
