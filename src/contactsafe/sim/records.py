@@ -12,17 +12,9 @@ _f = np.float64
 _i = np.int64
 
 _VIEWED = (
-    "ctrl",
-    "qfrc_applied",
-    "qfrc_constraint",
-    "qpos",
-    "qvel",
-    "sensordata",
-    "xpos",
-    "xmat",
-    "geom_xpos",
-    "geom_xmat",
-)
+    "ctrl", "qfrc_applied", "qfrc_constraint", "qpos", "qvel", "sensordata", "xpos", "xmat", "geom_xpos", "geom_xmat",
+    "site_xpos", "site_xmat",
+)  # fmt: skip
 _SENSORS = (
     "wrist_force", "wrist_torque", "wrist_accelerometer", "pad_board", "pad_table", "arm_board", "arm_table",
 )  # fmt: skip
