@@ -50,7 +50,7 @@ def test_json_is_strict_and_says_null_where_nothing_is():
     assert not {"NaN", "Infinity"} & set(text.replace(",", " ").split())
     read = json.loads(text, parse_constant=pytest.fail)
     assert read["spread"]["bottle"]["safe"]["time_s"] == {
-        "median": None, "p5": None, "p95": None, "min": None, "max": None, "n": 0,
+        "median": None, "mean": None, "p5": None, "p95": None, "min": None, "max": None, "n": 0,
     }  # fmt: skip
     assert read["trials"][4] == {
         "scenario": "bottle", "controller": "safe", "seed": 1, "metrics": {"force_n": None, "time_s": None},
