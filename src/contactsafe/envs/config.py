@@ -33,10 +33,10 @@ class ActionConfig:
     stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
     damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
     lead: float = 0.05
-    press: float = 0.005
+    press: float = 0.004
     height: float = 0.12
     reach: float = 0.27
-    tilt: float = 0.04
+    tilt: float = 0.06
     stiffness_low: Six = (60.0, 60.0, 60.0, 250.0, 250.0, 250.0)
     stiffness_high: Six = (250.0, 250.0, 250.0, 700.0, 700.0, 700.0)
     damping_low: Six = (14.0, 14.0, 14.0, 30.0, 30.0, 30.0)
