@@ -43,6 +43,7 @@ def test_another_numba_changes_the_cache(copied_sources, monkeypatch):
 
 def test_cache_folder_is_named_by_the_digest_and_old_ones_go(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiled, "_IN_USE_S", -1.0)
     folders = []
     for version in range(7):
         monkeypatch.setattr(compiled, "_digest", lambda version=version: f"version{version}")
