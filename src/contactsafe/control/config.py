@@ -10,7 +10,7 @@ from contactsafe.errors import InvalidInputError
 _PER_JOINT = ("K_pose", "D_pose")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
-    "work_hold_j", "hold_rise",
+    "push_yield_n", "push_hold_n", "push_tool_n",
 )  # fmt: skip
 
 
@@ -29,14 +29,24 @@ class ControllerConfig:
         residual_threshold: δ, N m.
         dwell_s: t_c, least time in contact mode, s.
         release_s: time the residual must have stayed below δ before contact mode ends, s.
-        recover_s: time constant with which posture stiffness comes back after contact, s; 0 for at once.
+        recover_s: time constant with which the task's pull comes back after it gave way to a contact, s; 0 for at once.
+        hold_recover_s: the same while something pushes the arm, s.
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
         contact_damping: damping of every joint while in contact, N m s/rad.
         approach_damping: damping of motion into an obstacle, along the contact's direction, N m s/rad.
         push_yield_nm: largest commanded push along the contact while the arm is what ran into it, N m; inf for none.
         push_hold_nm: the same while something pushes the arm, N m; inf for none.
-        work_hold_j: work received beyond what an elastic obstacle could give back that tells a pusher, J.
-        hold_rise: the arm yields again when, doing the work itself, it meets this many times the torque of the pusher.
+        push_yield_n: the same bounds as a force at the link in contact, N; inf for none. The smaller one counts.
+        push_hold_n: while something pushes the arm, N; inf for none.
+        push_meet_n: the bound with which a contact is met, N; it falls to `push_yield_n` within a few `meet_s`.
+        meet_s: s.
+        push_tool_n: largest commanded push of the tool against what it touches, N; inf for none.
+        tool_contact_n: least force at the tool that counts as its contact, N.
+        probe_m: way by which the arm gives way to a contact before it judges whether something pushes it, m.
+        probe_s: time constant with which torque and way are smoothed for that, s.
+        pusher_stiffness: of the softest thing that counts as an obstacle and not as a pusher, N/m.
+        hold_margin: the arm holds against this multiple of the pusher's torque.
+        hold_s: time constant with which it then tries again whether the pusher is still there, s; doubled each time.
         friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
         stiffness_range: allowed K_task, 1/s².
         damping_range: allowed D_task, 1/s.
@@ -60,13 +70,23 @@ class ControllerConfig:
     dwell_s: float = 0.05
     release_s: float = 0.0
     recover_s: float = 0.0
+    hold_recover_s: float = 0.0
     null_damping: float = 0.0
     contact_damping: float = 0.0
     approach_damping: float = 0.0
     push_yield_nm: float = math.inf
     push_hold_nm: float = math.inf
-    work_hold_j: float = 0.005
-    hold_rise: float = 1.5
+    push_yield_n: float = math.inf
+    push_hold_n: float = math.inf
+    push_meet_n: float = 20.0
+    meet_s: float = 0.15
+    push_tool_n: float = math.inf
+    tool_contact_n: float = 3.0
+    probe_m: float = 0.002
+    probe_s: float = 0.01
+    pusher_stiffness: float = 1500.0
+    hold_margin: float = 2.0
+    hold_s: float = 0.5
     friction_compensation: bool = True
     stiffness_range: tuple[float, float] = (10.0, 1500.0)
     damping_range: tuple[float, float] = (2.0, 120.0)

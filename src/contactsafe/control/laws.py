@@ -60,24 +60,28 @@ def _determinant(A):
 
 
 @compiled
-def impedance_wrench(Lambda, error, velocity, Jdot_qd, K_task, D_task):
-    """Give F_t without gravity and Coriolis terms, (4): Λ (K e − D ẋ − J̇ q̇).
+def stiffness_wrench(Lambda, error, K_task):
+    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m.
 
     Args:
         Lambda: task inertia, (6, 6).
         error: x_d − x, position then rotation vector, (6,), m and rad.
+        K_task: stiffness per unit task inertia, (6,), 1/s².
+    """
+    return matvec(Lambda, K_task * error)
+
+
+@compiled
+def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
+    """Give what damps the tool, −Λ (D ẋ + J̇ q̇) of (4), (6,), N and N m.
+
+    Args:
+        Lambda: task inertia, (6, 6).
         velocity: of the tool, (6,), m/s and rad/s.
         Jdot_qd: J̇ q̇, (6,).
-        K_task: stiffness per unit task inertia, (6,), 1/s².
         D_task: damping per unit task inertia, (6,), 1/s.
-
-    Returns:
-        Wrench, (6,), N and N m.
     """
-    acceleration = np.empty(6)
-    for i in range(6):
-        acceleration[i] = K_task[i] * error[i] - D_task[i] * velocity[i] - Jdot_qd[i]
-    return matvec(Lambda, acceleration)
+    return matvec(Lambda, -D_task * velocity - Jdot_qd)
 
 
 @compiled
@@ -89,15 +93,6 @@ def task_error(position_d, quat_d, position, rotation):
         error[i] = position_d[i] - position[i]
         error[3 + i] = rotvec[i]
     return error
-
-
-@compiled
-def posture_torque(q_pose, q, qd, K_pose, D_pose):
-    """Give Γ_pose = K2 (q_pose − q) − D2 q̇, (15), (n,), N m."""
-    out = np.empty(q.shape[0])
-    for i in range(q.shape[0]):
-        out[i] = K_pose[i] * (q_pose[i] - q[i]) - D_pose[i] * qd[i]
-    return out
 
 
 @compiled
@@ -155,25 +150,39 @@ def push_along(direction, M_inv, tau_net):
 
 
 @compiled
-def is_pushed(work, work_least, torque, torque_peak, margin):
-    """Tell something that pushes the arm from something the arm ran into, by what it gives back.
-
-    An elastic contact into which the arm put the work W, and whose torque has since fallen from its peak, has given
-    back W (1 − (torque/peak)²) at the most, whatever its stiffness; a lossy one less. More than that comes from a
-    pusher. A share of W is allowed on top: springs are not quite linear, nor lever arms constant.
+def tool_share(F_spring, force, contact_n, push_n):
+    """Give the share of the task's pull with which the tool presses no harder than a bound on what it touches.
 
     Args:
-        work: net work received from the contact since it was found, J.
-        work_least: the least value it has had, −W, J.
-        torque: size of the contact torque, N m.
-        torque_peak: largest it has been, N m.
-        margin: J.
+        F_spring: what pulls the tool to its target, (6,), N and N m.
+        force: of the environment on the tool, (3,), N.
+        contact_n: least force that counts as contact, N.
+        push_n: the bound, N.
+
+    Returns:
+        0 … 1; 1 without contact, or where the task pulls less than the bound against it.
     """
-    if torque_peak <= 0.0:
-        return False
-    given_back = work - work_least
-    elastic = -work_least * (1.15 - (torque / torque_peak) ** 2)
-    return given_back > elastic + margin
+    size = math.sqrt(dot(force, force))
+    if size < contact_n:
+        return 1.0
+    push = -dot(force, F_spring[:3]) / size
+    return 1.0 if push <= push_n else push_n / push
+
+
+@compiled
+def is_pushed(drop, moved, lever, stiffness):
+    """Tell something that pushes the arm from something that is in its way, by what giving way to it brings.
+
+    The torque of a spring of k N/m at a lever arm of l falls by k l² for every radian that the arm recedes; a pusher
+    goes on pushing. Half the fall that the softest obstacle would show draws the line.
+
+    Args:
+        drop: by which the contact's torque has fallen, N m.
+        moved: by which the arm has receded along the contact's direction meanwhile, rad.
+        lever: of the contact, m.
+        stiffness: of the softest thing that counts as an obstacle, N/m.
+    """
+    return drop < 0.5 * stiffness * lever * lever * moved
 
 
 @compiled

@@ -46,6 +46,10 @@ def safe() -> ControllerConfig:
         approach_damping=150.0,
         push_yield_nm=3.0,
         push_hold_nm=22.0,
+        push_yield_n=10.0,
+        push_hold_n=35.0,
+        push_tool_n=20.0,
+        hold_recover_s=0.03,
     )
 
 

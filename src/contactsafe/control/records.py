@@ -4,6 +4,7 @@ One controller is one record of `controller_dtype(n)`; many are an array of them
 """
 
 import math
+from dataclasses import fields
 
 import numpy as np
 
@@ -54,21 +55,23 @@ def target_dtype(n: int) -> np.dtype:
     )
 
 
+_SHARES = ("trigger_share", "observer_share", "lowpass_share", "recover_share", "probe_share", "hold_share")
+"""Parts of their way that first-order filters go in one tick."""
+
+
+def _copied(kind: type) -> list[str]:
+    """Name the fields of a configuration that the tick reads as they are: its single numbers and its switches."""
+    return [field.name for field in fields(ControllerConfig) if type(field.default) is kind]
+
+
 def params_dtype(n: int) -> np.dtype:
     """Describe a configuration resolved for one arm: per-joint arrays, per-tick factors."""
-    scalars = (
-        "trigger_share", "observer_share", "lowpass_share", "residual_threshold", "null_damping", "contact_damping",
-        "push_yield_nm", "push_hold_nm", "work_hold_j", "hold_rise", "approach_damping",
-        "recover_share", "recover_from", "stiffness_min", "stiffness_max", "damping_min", "damping_max", "joint_margin",
-        "joint_stop_stiffness", "joint_stop_damping", "manipulability_floor", "manipulability_damping", "torque_step",
-        "dt",
-    )  # fmt: skip
     return np.dtype(
-        [(name, _f) for name in scalars]
-        + [
-            (name, _i)
-            for name in ("contact_aware", "cancel_tool_wrench", "friction_compensation", "dwell_ticks", "release_ticks")
-        ]
+        [(name, _f) for name in _copied(float)]
+        + [(name, _i) for name in _copied(bool)]
+        + [(name, _f) for name in ("stiffness_min", "stiffness_max", "damping_min", "damping_max", "torque_step")]
+        + [(name, _f) for name in _SHARES]
+        + [("dwell_ticks", _i), ("release_ticks", _i)]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
         + [("friction", _f, (n, 3))]
     )
@@ -90,15 +93,20 @@ def state_dtype(n: int) -> np.dtype:
             ("target", target_dtype(n)),  # last good target
             ("mode", _i),
             ("mode_ticks", _i),  # ticks spent in the mode
-            ("work_j", _f),  # net work received from the contact since it was found, J
+            ("moved_rad", _f),  # by which the arm has receded along the contact's direction since the reference
+            ("moved_smooth_rad", _f),  # the same, smoothed
+            ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
+            ("judge_rad", _f),  # where it is judged next whether something pushes
+            ("reference_nm", _f),  # contact torque then, N m
+            ("hold_nm", _f),  # push limit while holding, N m
+            ("hold_s", _f),  # time constant with which it falls, s
             ("quiet_ticks", _i),  # ticks since the residual was above the threshold
             ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
-            ("posture_share", _f),  # of K_pose in force
+            ("contact_link", _i),  # link seen last in contact, 1 … n
+            ("task_share", _f),  # of what pulls to the target in force, 0 … 1
             ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
             ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
             ("holding", _i),  # 1 while something pushes the arm
-            ("work_least_j", _f),  # least value of work_j, J
-            ("peak_nm", _f),  # largest |residual_trigger| since contact, or since holding began, N m
             ("fault", _i),  # first fault since reset
             ("bad_ticks", _i),  # unusable measurements in a row
         ]
@@ -146,12 +154,7 @@ def controller_dtype(n: int) -> np.dtype:
 def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     """Resolve a configuration for an arm into a `params_dtype` record."""
     dt = config.dt
-    for name in (
-        "residual_threshold", "null_damping", "contact_damping", "push_yield_nm", "push_hold_nm", "work_hold_j",
-        "hold_rise", "approach_damping", "joint_margin", "joint_stop_stiffness", "joint_stop_damping",
-        "manipulability_floor", "manipulability_damping", "dt", "contact_aware", "cancel_tool_wrench",
-        "friction_compensation",
-    ):  # fmt: skip
+    for name in (*_copied(float), *_copied(bool)):
         params[name] = getattr(config, name)
     params["trigger_share"] = observer_gain(config.trigger_gain, dt)
     params["observer_share"] = observer_gain(config.observer_gain, dt)
@@ -161,12 +164,18 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt
     params["dwell_ticks"] = round(config.dwell_s / dt)
     params["release_ticks"] = round(config.release_s / dt)
-    params["recover_share"] = 1.0 - math.exp(-dt / config.recover_s) if config.recover_s > 0 else 1.0
-    params["recover_from"] = 0.0 if config.recover_s > 0 else 1.0
+    params["recover_share"] = share_per_tick(config.recover_s, dt)
+    params["probe_share"] = share_per_tick(config.probe_s, dt)
+    params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
     params["D_pose"] = _per_joint(config.D_pose, arm.n)
     params["q_min"], params["q_max"] = arm.q_min, arm.q_max
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
+
+
+def share_per_tick(time_constant_s: float, dt: float) -> float:
+    """Give the share of its way that a first-order filter goes in one tick; all of it where its time constant is 0."""
+    return 1.0 - math.exp(-dt / time_constant_s) if time_constant_s > 0 else 1.0
 
 
 def _per_joint(values: tuple[float, ...], n: int) -> np.ndarray:

@@ -7,20 +7,21 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.control.laws import (
     contact_nullspace,
-    impedance_wrench,
+    damping_wrench,
     is_pushed,
     joint_stop_torque,
     limit_torque,
     momentum,
     observer_step,
-    posture_torque,
     push_along,
+    stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
+    tool_share,
 )
 from contactsafe.control.records import CONTACT, FREE
-from contactsafe.robot.dynamics import update_dynamics
+from contactsafe.robot.dynamics import contact_lever, update_dynamics
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
 
@@ -29,9 +30,6 @@ _LOST_AFTER_TICKS = 20
 
 _ABSURD = 1e6
 """No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
-
-_SETTLED = 0.75
-"""A torque has stopped rising when the slower residual has come this near to the faster one."""
 
 
 @compiled(nogil=True)
@@ -132,7 +130,7 @@ def _start(c):
     """Begin at rest: momentum as measured, command at gravity, so that nothing jumps."""
     state, dynamics = c.state, c.dynamics
     state.started = 1
-    state.posture_share = 1.0
+    state.task_share = 1.0
     state.momentum[:] = momentum(dynamics.M, c.measurement.qd)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
@@ -187,98 +185,159 @@ def _supervise(c):
     state.mode_ticks += 1
     state.quiet_ticks = 0 if link != 0 else state.quiet_ticks + 1
     if state.mode == FREE:
-        state.posture_share += params.recover_share * (1.0 - state.posture_share)
         if link != 0 and params.contact_aware != 0:
             _enter(state, CONTACT)
     elif state.mode_ticks >= params.dwell_ticks and state.quiet_ticks > params.release_ticks:
         _enter(state, FREE)
     if state.mode == CONTACT:
-        state.posture_share = params.recover_from
         if link != 0:
             state.direction[:] = state.residual_trigger / math.sqrt(dot(state.residual_trigger, state.residual_trigger))
-    _watch_work(c)
+            state.contact_link = link
+    _watch_push(c)
     c.output.link = link
 
 
 @compiled
 def _enter(state, mode):
     state.mode, state.mode_ticks = mode, 0
-    state.work_j, state.work_least_j, state.peak_nm, state.holding = 0.0, 0.0, 0.0, 0
+    state.moved_rad, state.moved_smooth_rad, state.torque_smooth_nm, state.reference_nm = 0.0, 0.0, 0.0, 0.0
+    state.judge_rad, state.holding, state.hold_s, state.hold_nm = math.inf, 0, 0.0, math.nan
 
 
 @compiled
-def _watch_work(c):
-    """Decide between holding and yielding by the work exchanged with the contact.
+def _watch_push(c):
+    """Tell what pushes the arm from what is in its way: give way a little, and see whether the torque falls.
 
-    Torque and velocity pass the same filters, or the torque's lag would look like work.
+    Torque and velocity pass the same filters, or the torque's lag would look like a pusher.
     """
     state, params = c.state, c.params
     observer_step(state.velocity_observed, params.trigger_share, c.measurement.qd)
     observer_step(state.velocity_seen, params.lowpass_share, state.velocity_observed)
     if state.mode != CONTACT:
         return
-    power = dot(state.residual_trigger, state.velocity_seen)
-    size = math.sqrt(dot(state.residual_trigger, state.residual_trigger))
-    state.work_j += power * params.dt
-    state.work_least_j = min(state.work_least_j, state.work_j)
-    if state.holding == 0:
-        state.peak_nm = max(state.peak_nm, size)
-        settled = math.sqrt(dot(state.residual, state.residual)) > _SETTLED * size
-        if settled and is_pushed(state.work_j, state.work_least_j, size, state.peak_nm, params.work_hold_j):
-            state.holding, state.peak_nm = 1, size
-    elif power >= 0.0:
-        state.peak_nm = max(state.peak_nm, size)
-    elif size > params.hold_rise * state.peak_nm:
-        # The torque rises well above the pusher's while the arm does the work: that is running into something.
-        state.holding, state.work_j, state.work_least_j = 0, 0.0, 0.0
+    lever = contact_lever(c.handle, state.contact_link, state.direction)
+    if math.isnan(state.hold_nm):
+        state.hold_nm = params.push_meet_n * _longest_lever(c)
+    state.moved_rad += params.dt * dot(state.direction, state.velocity_seen)
+    torque = dot(state.direction, state.residual_trigger)
+    state.torque_smooth_nm += params.probe_share * (torque - state.torque_smooth_nm)
+    state.moved_smooth_rad += params.probe_share * (state.moved_rad - state.moved_smooth_rad)
+    moved, torque = state.moved_smooth_rad, state.torque_smooth_nm
+    step = params.probe_m / lever
+    if moved <= 0.0:  # the arm moves into it
+        state.moved_rad, state.moved_smooth_rad, state.reference_nm = min(state.moved_rad, 0.0), 0.0, torque
+    state.judge_rad = min(state.judge_rad, moved + step)
+    if moved >= state.judge_rad:
+        state.judge_rad = moved + step
+        if is_pushed(state.reference_nm - torque, moved, lever, params.pusher_stiffness):
+            state.holding = 1
+            state.hold_s = max(2.0 * state.hold_s, params.hold_s)
+            state.hold_nm = params.hold_margin * torque
+        else:
+            state.holding, state.hold_s, state.hold_nm = 0, 0.0, 0.0
+    state.hold_nm -= params.dt / max(state.hold_s, params.meet_s) * state.hold_nm
 
 
 @compiled
 def _law(c):
-    """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m."""
+    """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m.
+
+    What pulls towards a target (stiffness, posture) is kept apart from what damps: the task's share in force, 1 in
+    peace, scales the one and never the other.
+    """
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
     q, qd = c.measurement.q, c.measurement.qd
     Lambda, J_M_inv = task_inertia(
         dynamics.J, dynamics.M_inv, params.manipulability_floor, params.manipulability_damping
     )
+    J_bar = matmul(J_M_inv.T, Lambda)
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
-    F = impedance_wrench(Lambda, error, dynamics.velocity, dynamics.Jdot_qd, target.K_task, target.D_task)
-    tau_pose = posture_torque(target.q_pose, q, qd, state.posture_share * params.K_pose, params.D_pose)
+    F_spring = stiffness_wrench(Lambda, error, target.K_task)
+    F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, target.D_task)
+    N_t = task_nullspace(dynamics.J, J_bar)
+    N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
+    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * (target.q_pose - q))
+    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
     c.output.error[:] = error
-    c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
+    share = tool_share(F_spring, _tool_force(c, J_bar), params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
-        # N_tᵀ Γ = Γ − Jᵀ Λ J M⁻¹ Γ, without forming the projector.
-        F_pose = matvec(Lambda, matvec(J_M_inv, tau_pose))
-        tau_net = matvec_t(dynamics.J, F - F_pose) + tau_pose
+        c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
+        _follow_share(state, params, share)
+        tau = state.task_share * pull + damping
     else:
-        tau_net = _contact_law(c, F, matmul(J_M_inv.T, Lambda), tau_pose)
-    return tau_net + dynamics.c + dynamics.g
+        tau = _contact_law(c, pull, damping, matvec_t(dynamics.J, matvec_t(J_bar, state.residual)), N_t - N_ct, share)
+    return tau + dynamics.c + dynamics.g
 
 
 @compiled
-def _contact_law(c, F, J_bar, tau_pose):
+def _tool_force(c, J_bar):
+    """Force of the environment on the tool, (3,), N: measured, or without a sensor what the residual says, J#ᵀ r."""
+    if c.measurement.has_wrench != 0:
+        return c.measurement.wrench_ee[:3]
+    return matvec_t(J_bar, c.state.residual_trigger)[:3]
+
+
+@compiled
+def _follow_share(state, params, wanted):
+    """Let the task's share fall at once and come back slowly; fast where something pushes the arm."""
+    if wanted < state.task_share:
+        state.task_share = wanted
+    else:
+        back = params.recover_share if state.holding == 0 else params.hold_share
+        state.task_share += back * (wanted - state.task_share)
+
+
+@compiled
+def _contact_law(c, pull, damping, task_disturbance, removed, share):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
-    braked along the contact's direction; and the command never pushes along it harder than the bound in force.
+    braked along the contact's direction; and the command never pushes along it harder than the bound in force: first
+    the compensation gives way, then the pull of the task as a whole, last the damping.
     """
     state, dynamics, params = c.state, c.dynamics, c.params
-    qd, direction = c.measurement.qd, c.state.direction
-    F_tc = F - matvec_t(J_bar, state.residual)
-    N_t = task_nullspace(dynamics.J, J_bar)
-    N_ct = contact_nullspace(N_t, dynamics.M_inv, direction)
-    tau = matvec_t(dynamics.J, F_tc) + matvec_t(N_ct, tau_pose)
-    tau -= params.null_damping * matvec_t(N_t - N_ct, qd)
-    tau -= params.contact_damping * qd
-    limit = params.push_hold_nm if state.holding != 0 else params.push_yield_nm
-    push = push_along(direction, dynamics.M_inv, tau)
+    qd, direction, M_inv = c.measurement.qd, c.state.direction, c.dynamics.M_inv
+    limit = _push_limit(c)
+    damping -= params.null_damping * matvec_t(removed, qd)
+    damping -= params.contact_damping * qd
+    compensation = -task_disturbance
+    push = push_along(direction, M_inv, compensation)
+    if push > limit:
+        compensation *= limit / push
+    left = limit - max(min(push, limit), 0.0)
+    pull_push = push_along(direction, M_inv, pull)
+    if pull_push > 0.0:
+        share = min(share, left / pull_push)
+    _follow_share(state, params, share)
+    tau = state.task_share * pull + compensation + damping
+    c.output.push_nm, c.output.push_limit_nm = push + pull_push, limit
+    push = push_along(direction, M_inv, tau)
     if push > limit:
         tau += (push - limit) * direction
     if state.holding == 0:
         # After the bound, or the task would use up what the brake frees.
         tau -= params.approach_damping * min(dot(direction, qd), 0.0) * direction
-    c.output.push_nm, c.output.push_limit_nm = push, limit
     return tau
+
+
+@compiled
+def _push_limit(c):
+    """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
+    params, link, direction = c.params, c.state.contact_link, c.state.direction
+    lever = contact_lever(c.handle, link, direction)
+    limit = min(params.push_yield_nm, params.push_yield_n * lever)
+    if not c.state.hold_nm > limit:
+        return limit
+    return max(limit, min(c.state.hold_nm, params.push_hold_nm, params.push_hold_n * _longest_lever(c)))
+
+
+@compiled
+def _longest_lever(c):
+    """Longest lever arm of the links that the contact may be on: the link found is the least, near links show less."""
+    lever = 0.0
+    for link in range(c.state.contact_link, c.state.direction.shape[0] + 1):
+        lever = max(lever, contact_lever(c.handle, link, c.state.direction))
+    return lever
 
 
 @compiled

@@ -1,6 +1,9 @@
 """What a simulated world can be told: plant, sensors, board, camera, obstacles; frozen dataclasses with units."""
 
+import math
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from contactsafe.errors import InvalidInputError
 
@@ -15,14 +18,16 @@ class PlantConfig:
     """How the simulated arm differs from what the controller believes.
 
     Attributes:
-        friction_scale: joint friction as a multiple of the published one; 0 for a frictionless arm.
-        inertia_scale: masses and inertias of the links as a multiple of the nominal ones.
-        payload_kg: mass at the tool's centre that the controller does not know of.
+        friction_scale: joint friction as a multiple of the published one, one for all joints or one each; 0 for a
+            frictionless arm.
+        inertia_scale: masses and inertias of the links as a multiple of the nominal ones, one for all or one each.
+        payload_kg: mass at the tool's centre that the controller does not know of; negative where the tool is lighter
+            than the controller believes.
         torque_delay_ticks: ticks between a command and its effect (0 or 1).
     """
 
-    friction_scale: float = 1.0
-    inertia_scale: float = 1.0
+    friction_scale: float | tuple[float, ...] = 1.0
+    inertia_scale: float | tuple[float, ...] = 1.0
     payload_kg: float = 0.0
     torque_delay_ticks: int = 0
 
@@ -30,21 +35,37 @@ class PlantConfig:
         """Refuse a plant that cannot be built."""
         if self.torque_delay_ticks not in (0, 1):
             raise InvalidInputError(f"torque_delay_ticks = {self.torque_delay_ticks}; give 0 or 1")
-        if self.friction_scale < 0 or self.inertia_scale <= 0 or self.payload_kg < 0:
+        friction, inertia = np.atleast_1d(self.friction_scale), np.atleast_1d(self.inertia_scale)
+        if not (friction >= 0).all() or not (inertia > 0).all() or not math.isfinite(self.payload_kg):
             raise InvalidInputError(
                 f"plant (friction × {self.friction_scale}, inertia × {self.inertia_scale}, "
                 f"payload {self.payload_kg} kg) cannot exist; "
-                "friction_scale and payload_kg must be ≥ 0, inertia_scale > 0"
+                "friction_scale must be ≥ 0, inertia_scale > 0, payload_kg finite"
             )
+
+
+def per_joint(value: float | tuple[float, ...], n: int, name: str) -> np.ndarray:
+    """Give one number for each of n joints, (n,).
+
+    Raises:
+        InvalidInputError: neither one number nor n.
+    """
+    numbers = np.atleast_1d(value)
+    if numbers.size not in (1, n):
+        raise InvalidInputError(f"{name} has {numbers.size} numbers; give one, or one for each of {n} joints")
+    return np.broadcast_to(numbers, (n,))
 
 
 @dataclass(frozen=True)
 class SensorConfig:
-    """Noise of the sensors, standard deviations of white noise each tick.
+    """Errors of the sensors; noise is white, given as the standard deviation of each tick.
 
     Attributes:
         q_rad: joint position.
         qd_rad_s: joint velocity.
+        encoder_step_rad: what joint positions are rounded to; 0 for not at all.
+        velocity_filter_hz: joint velocity is the measured position's difference quotient behind a first-order low-pass
+            of this cut-off (then `qd_rad_s` is not used); inf for the plant's own velocity.
         torque_nm: joint torque, command against what the joint exerts.
         force_n: wrist force sensor, each axis.
         moment_nm: wrist moment, each axis.
@@ -55,6 +76,8 @@ class SensorConfig:
 
     q_rad: float = 1e-5
     qd_rad_s: float = 1e-3
+    encoder_step_rad: float = 0.0
+    velocity_filter_hz: float = math.inf
     torque_nm: float = 0.05
     force_n: float = 0.1
     moment_nm: float = 0.005
@@ -63,7 +86,10 @@ class SensorConfig:
     accelerometer_m_s2: float = 0.02
 
 
-NO_NOISE = SensorConfig(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE = SensorConfig(0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+REAL_SENSORS = SensorConfig(q_rad=0.0, encoder_step_rad=2 * math.pi / 2**19, velocity_filter_hz=100.0)
+"""Encoders of 19 bit, velocity from their difference, low-passed; the noise of torque and wrist sensor as by default."""
 
 
 @dataclass(frozen=True)
@@ -109,15 +135,18 @@ class Camera:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A thing that the arm may meet, held in place by springs along x, y and z.
+    """A thing that the arm may meet, held by springs along x, y and z, or fixed; its hold may move towards the arm.
 
     Attributes:
         position: of its centre at rest, world, m.
         radius: m.
-        stiffness: of each spring, N/m.
+        stiffness: of each spring, N/m; inf for a thing that cannot move.
         mass: kg.
         damping_ratio: of spring and mass.
         half_length: of a standing cylinder, m; 0 for a sphere.
+        surface_s: time constant of MuJoCo's contact, s: the larger, the softer its skin (0.02 is MuJoCo's default).
+        travel: way that its hold moves, world, m.
+        travel_s: when it sets off and when it arrives, s since reset.
     """
 
     position: Vector3
@@ -126,6 +155,14 @@ class Obstacle:
     mass: float = 1.0
     damping_ratio: float = 0.2
     half_length: float = 0.0
+    surface_s: float = 0.004
+    travel: Vector3 = (0.0, 0.0, 0.0)
+    travel_s: tuple[float, float] = (0.0, 1.0)
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it cannot move."""
+        return math.isinf(self.stiffness)
 
     def __post_init__(self):
         """Refuse what MuJoCo would hardly feel (its contact stiffness scales with mass) or cannot build."""
@@ -136,6 +173,11 @@ class Obstacle:
         if self.radius <= 0 or self.stiffness <= 0:
             raise InvalidInputError(
                 f"obstacle radius = {self.radius} m, stiffness = {self.stiffness} N/m; both must be greater than 0"
+            )
+        if any(self.travel) and (self.fixed or not self.travel_s[0] < self.travel_s[1]):
+            raise InvalidInputError(
+                f"obstacle travels {self.travel} m in {self.travel_s} s with stiffness {self.stiffness} N/m; "
+                "give a finite stiffness, and a time of arrival after that of departure"
             )
 
 

@@ -1,12 +1,15 @@
 """A simulated world as NumPy records: where its plant lies in memory, its sensors' errors, what a step measured."""
 
+import math
+
 import mujoco
 import numpy as np
 
+from contactsafe.control.laws import observer_gain
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.mjcf import TOOL_SITE
-from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig
+from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig, per_joint
 
 _f = np.float64
 _i = np.int64
@@ -28,18 +31,25 @@ def noise_channels(n: int) -> int:
 def plant_dtype(n: int) -> np.dtype:
     """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
     return np.dtype(
-        [(name, np.uintp) for name in ("model", "data", *_VIEWED)]
+        [(name, np.uintp) for name in ("model", "data", *_VIEWED, "qpos_spring")]
         + [
             (name, _i)
-            for name in ("nv", "nbody", "ngeom", "nsensordata", "tcp_site", "n_obstacles", "delay_ticks", "tick")
+            for name in ("nq", "nv", "nbody", "ngeom", "nsensordata", "tcp_site", "n_obstacles", "delay_ticks", "tick")
         ]
         + [(f"adr_{name}", _i) for name in _SENSORS]
         + [
             ("adr_obstacles", _i, (MAX_OBSTACLES,)),
             ("obstacle_bodies", _i, (MAX_OBSTACLES,)),
+            ("obstacle_springs", _i, (MAX_OBSTACLES,)),  # address of the first spring's rest length; −1 for none
+            ("obstacle_travel", _f, (MAX_OBSTACLES, 3)),  # m
+            ("obstacle_travel_ticks", _f, (MAX_OBSTACLES, 2)),  # departure and arrival
             ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
             ("q_sigma", _f),
             ("qd_sigma", _f),
+            ("encoder_step", _f),  # rad; 0 for none
+            ("velocity_share", _f),  # of the difference quotient, a tick; 0 for the plant's own velocity
+            ("q_seen", _f, (n,)),  # last measured positions, rad
+            ("qd_seen", _f, (n,)),  # last measured velocities, rad/s
             ("torque_sigma", _f),
             ("force_sigma", _f),
             ("moment_sigma", _f),
@@ -106,7 +116,8 @@ def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, conf
     plant["model"], plant["data"] = model._address, data._address
     for name in _VIEWED:
         plant[name] = getattr(data, name).ctypes.data
-    for name in ("nv", "nbody", "ngeom", "nsensordata"):
+    plant["qpos_spring"] = model.qpos_spring.ctypes.data
+    for name in ("nq", "nv", "nbody", "ngeom", "nsensordata"):
         plant[name] = getattr(model, name)
     plant["tcp_site"] = model.site(TOOL_SITE).id
     plant["delay_ticks"] = config.plant.torque_delay_ticks
@@ -114,12 +125,18 @@ def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, conf
     for name in _SENSORS:
         plant[f"adr_{name}"] = names.get(name, -1)
     plant["n_obstacles"] = len(config.obstacles)
-    for index in range(len(config.obstacles)):
+    for index, obstacle in enumerate(config.obstacles):
         plant["adr_obstacles"][index] = names[f"arm_obstacle{index}"]
         plant["obstacle_bodies"][index] = model.body(f"obstacle{index}").id
+        plant["obstacle_springs"][index] = -1 if obstacle.fixed else model.joint(f"obstacle{index}_x").qposadr[0]
+        plant["obstacle_travel"][index] = obstacle.travel
+        plant["obstacle_travel_ticks"][index] = np.array(obstacle.travel_s) / model.opt.timestep
     plant["friction"] = arm.friction
-    plant["friction"][:, 0] *= config.plant.friction_scale
+    plant["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
     sensors = config.sensors
+    plant["encoder_step"] = sensors.encoder_step_rad
+    if math.isfinite(sensors.velocity_filter_hz):
+        plant["velocity_share"] = observer_gain(2 * math.pi * sensors.velocity_filter_hz, model.opt.timestep)
     for field, value in (
         ("q_sigma", sensors.q_rad), ("qd_sigma", sensors.qd_rad_s), ("torque_sigma", sensors.torque_nm),
         ("force_sigma", sensors.force_n), ("moment_sigma", sensors.moment_nm),

@@ -11,7 +11,7 @@ from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.facts import ArmFacts, Inertia, Tool
 from contactsafe.robot.mjcf import FLANGE_SITE, arm_body, model_root, numbers
-from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, WorldConfig
+from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, WorldConfig, per_joint
 
 _STIFF = "0.004 1"  # contact time constant, s, and damping ratio: four ticks, for hard plastic on metal
 # The pad: measured 4.8 kN/m a corner that touches, so 19 kN/m flat on the board, 10 kN/m on an edge.
@@ -57,26 +57,29 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
 
 
 def _perturbed(facts: ArmFacts, plant: PlantConfig) -> ArmFacts:
-    if plant.inertia_scale == 1.0:
-        return facts
-    k = plant.inertia_scale
+    scales = per_joint(plant.inertia_scale, len(facts.links), "inertia_scale")
     links = tuple(
-        replace(
-            link,
-            inertia=replace(
-                link.inertia,
-                mass=k * link.inertia.mass,
-                tensor=tuple(k * value for value in link.inertia.tensor),  # type: ignore[arg-type]
-            ),
-        )
-        for link in facts.links
+        replace(link, inertia=_scaled(link.inertia, float(scale)))
+        for link, scale in zip(facts.links, scales, strict=True)
     )
     return replace(facts, links=links)
+
+
+def _scaled(inertia: Inertia, scale: float) -> Inertia:
+    tensor = tuple(scale * value for value in inertia.tensor)
+    return replace(inertia, mass=scale * inertia.mass, tensor=tensor)  # type: ignore[arg-type]
 
 
 def _loaded(tool: Tool, plant: PlantConfig) -> Tool:
     if plant.payload_kg == 0.0:
         return tool
+    if plant.payload_kg < 0:
+        if plant.payload_kg <= -tool.inertia.mass:
+            raise InvalidInputError(
+                f"payload_kg = {plant.payload_kg} takes more than the {tool.inertia.mass:g} kg that tool "
+                f"'{tool.name}' weighs; give a larger one"
+            )
+        return replace(tool, inertia=_scaled(tool.inertia, 1.0 + plant.payload_kg / tool.inertia.mass))
     point = Inertia(plant.payload_kg, tool.inertia.com, (1e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0))
     return replace(tool, inertia=tool.inertia + point)
 
@@ -116,8 +119,9 @@ def _camera(world: ET.Element, config: WorldConfig) -> None:
 def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
     name = f"obstacle{index}"
     body = ET.SubElement(world, "body", name=name, pos=numbers(obstacle.position), gravcomp="1")
-    damping = 2 * obstacle.damping_ratio * math.sqrt(obstacle.stiffness * obstacle.mass)
-    for axis, direction in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True):
+    damping = 0.0 if obstacle.fixed else 2 * obstacle.damping_ratio * math.sqrt(obstacle.stiffness * obstacle.mass)
+    axes = () if obstacle.fixed else zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)
+    for axis, direction in axes:
         ET.SubElement(
             body, "joint", name=f"{name}_{axis}", type="slide", axis=direction,
             stiffness=numbers([obstacle.stiffness]), damping=numbers([damping]),
@@ -126,8 +130,8 @@ def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
     if obstacle.half_length > 0:
         shape = {"type": "cylinder", "size": numbers((obstacle.radius, obstacle.half_length))}
     ET.SubElement(
-        body, "geom", name=name, mass=numbers([obstacle.mass]), contype="1", conaffinity="2", solref=_STIFF,
-        rgba="0.85 0.45 0.1 1", **shape,
+        body, "geom", name=name, mass=numbers([obstacle.mass]), contype="1", conaffinity="2",
+        solref=f"{obstacle.surface_s!r} 1", rgba="0.85 0.45 0.1 1", **shape,
     )  # fmt: skip
 
 

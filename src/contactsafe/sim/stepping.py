@@ -49,8 +49,15 @@ def sense(plant, controller, noise):
     n = measurement.q.shape[0]
     qpos, qvel = view1(plant.qpos, n), view1(plant.qvel, n)
     for i in range(n):
-        measurement.q[i] = qpos[i] + plant.q_sigma * noise[i]
-        measurement.qd[i] = qvel[i] + plant.qd_sigma * noise[n + i]
+        q = qpos[i] + plant.q_sigma * noise[i]
+        if plant.encoder_step > 0.0:
+            q = plant.encoder_step * math.floor(q / plant.encoder_step + 0.5)
+        qd = qvel[i] + plant.qd_sigma * noise[n + i]
+        if plant.velocity_share > 0.0:
+            rate = 0.0 if plant.tick == 0 else (q - plant.q_seen[i]) / controller.params.dt
+            qd = plant.qd_seen[i] + plant.velocity_share * (rate - plant.qd_seen[i])
+        plant.q_seen[i], plant.qd_seen[i] = q, qd
+        measurement.q[i], measurement.qd[i] = q, qd
     _sense_wrench(plant, controller, noise[3 * n :])
 
 
@@ -82,7 +89,7 @@ def _sense_wrench(plant, controller, noise):
 
 @compiled
 def act(plant, controller, noise):
-    """Apply the command to the plant: delay, torque noise, friction, and the push that disturbs it."""
+    """Apply the command to the plant: delay, torque noise, friction, the push that disturbs it; move the obstacles."""
     tau = controller.output.torque
     n = tau.shape[0]
     ctrl, applied = view1(plant.ctrl, n), view1(plant.qfrc_applied, n)
@@ -93,6 +100,20 @@ def act(plant, controller, noise):
         plant.tau_delayed[i] = tau[i]
         ctrl[i] = command + plant.torque_sigma * noise[2 * n + i]
         applied[i] = push[i] - friction[i]
+    _move_obstacles(plant)
+
+
+@compiled
+def _move_obstacles(plant):
+    """Move the springs' rest lengths of the obstacles that travel."""
+    rest = view1(plant.qpos_spring, plant.nq)
+    for index in range(plant.n_obstacles):
+        adr = plant.obstacle_springs[index]
+        if adr >= 0:
+            start, stop = plant.obstacle_travel_ticks[index]
+            share = min(max((plant.tick - start) / (stop - start), 0.0), 1.0)
+            for k in range(3):
+                rest[adr + k] = share * plant.obstacle_travel[index, k]
 
 
 @compiled

@@ -53,9 +53,13 @@ def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list
 
 
 def _plants(arm: Arm, configs: list[WorldConfig]) -> list[mujoco.MjModel]:
-    """Compile a plant for each configuration, equal ones once."""
+    """Compile a plant for each configuration, equal ones once, but for obstacles that travel: those move the model."""
     compiled: dict[WorldConfig, mujoco.MjModel] = {}
-    return [compiled.setdefault(c, build_plant(arm, c)) if c not in compiled else compiled[c] for c in configs]
+    return [
+        build_plant(arm, c) if any(any(o.travel) for o in c.obstacles)
+        else compiled.setdefault(c, build_plant(arm, c)) if c not in compiled else compiled[c]
+        for c in configs
+    ]  # fmt: skip
 
 
 class Worlds:
@@ -133,6 +137,7 @@ class Worlds:
         data.ctrl[:] = dynamics["g"]
         mujoco.mj_forward(model, data)
         plant["tick"], plant["push_body"] = 0, 0
+        plant["q_seen"], plant["qd_seen"] = q, 0.0
         plant["tau_delayed"] = dynamics["g"]
         sensors = self.configs[i].sensors
         plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)

@@ -1,0 +1,253 @@
+"""Random collisions: what the arm was doing, what it met and where, and how the plant differs from its model.
+
+A scene depends on its seed alone. The motion is run once without obstacles; the obstacle is then placed where a random
+point of a random link will be.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactsafe.envs.action import DOWN
+from contactsafe.learning.evaluation import HELD_OUT_SEED
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
+from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
+from contactsafe.robot.shape import arm_capsules, link_frames
+from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
+
+LEAD_M = 0.05
+"""How far a policy's x_d may lead the tool."""
+
+LINKS = (2, 3, 4, 5, 6, 7, 8)
+"""Links that are met; 8 is the hand."""
+
+AFTER_S = 2.5
+"""How long a trial goes on after the arm would reach the obstacle, s."""
+
+_PRESS_M = 0.004
+_MARGIN_RAD = 0.15  # of the joint range, kept free along the path
+_CLEAR_M = 0.002
+_SKIN_S = 0.02
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the tool is asked to do.
+
+    Attributes:
+        seed: of the scene.
+        wiping: on the board; otherwise in free air.
+        start: tool pose at first.
+        way: from start to end, world, m; zeros to hold.
+        speed_m_s: of x_d along it.
+        limited: x_d leads the tool by `LEAD_M` at most, as a policy's does.
+        stiffness: K1, (6,), 1/s².
+        q_start: joint positions, (n,), rad.
+        meets_at: share of the way at which the obstacle is met.
+        plant: how the arm differs from its model.
+    """
+
+    seed: int
+    wiping: bool
+    start: Pose
+    way: np.ndarray
+    speed_m_s: float
+    limited: bool
+    stiffness: np.ndarray
+    q_start: np.ndarray
+    meets_at: float
+    plant: PlantConfig
+
+    @property
+    def holds(self) -> bool:
+        """Whether the tool is to stay where it is."""
+        return not self.way.any()
+
+    @property
+    def meets_s(self) -> float:
+        """When the obstacle is met, s."""
+        return 0.6 if self.holds else 0.2 + self.meets_at * float(np.linalg.norm(self.way)) / self.speed_m_s
+
+    @property
+    def duration_s(self) -> float:
+        """How long the trial lasts, s."""
+        return self.meets_s + AFTER_S
+
+    def target(self, time_s: float) -> np.ndarray:
+        """Give where on its way x_d is, (3,), m; it sets off after 0.2 s."""
+        if self.holds:
+            return self.start.position
+        share = min(max((time_s - 0.2) * self.speed_m_s / float(np.linalg.norm(self.way)), 0.0), 1.0)
+        return self.start.position + share * self.way
+
+    def world(self, obstacles: tuple[Obstacle, ...], real: bool) -> WorldConfig:
+        """Give the world to run it in, with the plant and sensors as they are or as the controller believes."""
+        if real:
+            return WorldConfig(plant=self.plant, sensors=REAL_SENSORS, obstacles=obstacles)
+        return WorldConfig(obstacles=obstacles)
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """An obstacle and the point of the arm that meets it.
+
+    Attributes:
+        obstacle: what is met.
+        link: of the arm, 2 … 8, 8 being the hand.
+    """
+
+    obstacle: Obstacle
+    link: int
+
+
+def scene_rng(seed: int, part: int) -> np.random.Generator:
+    """Give the generator of one part of a scene: 0 its motion, 1 its obstacles."""
+    return np.random.default_rng([HELD_OUT_SEED, seed, part])
+
+
+def draw_plant(rng: np.random.Generator, n: int) -> PlantConfig:
+    """Draw a plant that differs from its model: friction ± 20 % a joint, inertia ± 10 % a link, payload ± 0.2 kg."""
+    return PlantConfig(
+        friction_scale=tuple(rng.uniform(0.8, 1.2, n).tolist()),
+        inertia_scale=tuple(rng.uniform(0.9, 1.1, n).tolist()),
+        payload_kg=float(rng.uniform(-0.2, 0.2)),
+        torque_delay_ticks=1,
+    )
+
+
+def draw_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
+    """Draw what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or wiping."""
+    rng, board = scene_rng(seed, 0), board or BoardConfig()
+    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    speed = rng.uniform(0.1, 0.3 if wiping else 0.5)
+    stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
+    meets_at = rng.uniform(0.25, 0.6)
+    plant = draw_plant(rng, arm.n)
+    while True:
+        pose = _draw_pose(rng, wiping, board)
+        way = np.zeros(3) if holds else _draw_way(rng, wiping)
+        postures = _reachable(arm, pose, way, wiping, rng)
+        if postures is not None:
+            return Motion(seed, wiping, pose, way, speed, limited, stiffness, postures, meets_at, plant)
+
+
+def _draw_pose(rng: np.random.Generator, wiping: bool, board: BoardConfig) -> Pose:
+    x, y, z = board.centre
+    if wiping:
+        position = np.array([x + rng.uniform(-0.15, 0.15), y + rng.uniform(-0.2, 0.2), z - _PRESS_M])
+        return Pose(position, DOWN.copy())
+    position = np.array([rng.uniform(0.3, 0.65), rng.uniform(-0.4, 0.4), rng.uniform(z + 0.08, 0.6)])
+    return Pose(position, quat_multiply(rotvec_to_quat(rng.uniform(-0.4, 0.4, 3)), DOWN))
+
+
+def _draw_way(rng: np.random.Generator, wiping: bool) -> np.ndarray:
+    direction = rng.standard_normal(3)
+    if wiping:
+        direction[2] = 0.0
+    return rng.uniform(0.2, 0.45) * direction / np.linalg.norm(direction)
+
+
+def _reachable(arm: Arm, pose: Pose, way, wiping: bool, rng) -> np.ndarray | None:
+    """Give joint positions at the start of a way that the arm can follow within its range; None if it cannot."""
+    q = arm.home + (0.0 if wiping else rng.uniform(-0.5, 0.5, arm.n))
+    q_start, nominal = None, arm.nominal()
+    for share in np.linspace(0.0, 1.0, 6):
+        position = pose.position + share * way
+        if position[2] < (-0.005 if wiping else 0.06) or np.linalg.norm(position[:2]) > 0.72:
+            return None
+        seed, q = q, np.empty(arm.n)
+        error, turn = solve_ik(nominal.handle, position, pose.quat, seed, arm.q_min, arm.q_max, q)
+        if error > POSITION_TOLERANCE or turn > 1e-2:
+            return None
+        if (q < arm.q_min + _MARGIN_RAD).any() or (q > arm.q_max - _MARGIN_RAD).any():
+            return None
+        q_start = q if q_start is None else q_start
+    return q_start
+
+
+def draw_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeting, ...]:
+    """Place one obstacle, or for a quarter of the scenes two, on the surface of the arm as it will move.
+
+    Args:
+        arm: built from facts.
+        motion: what the tool does.
+        q_free: joint positions while it does so and nothing is in the way, one row a ms, (T, n), rad.
+    """
+    rng = scene_rng(motion.seed, 1)
+    meetings: list[Meeting] = []
+    wanted = 2 if rng.random() < 0.25 else 1
+    while len(meetings) < wanted:
+        meeting = _draw_meeting(arm, motion, q_free, rng)
+        if meeting is not None and all(meeting.link != other.link for other in meetings):
+            meetings.append(meeting)
+    return tuple(meetings)
+
+
+def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.Generator) -> Meeting | None:
+    link = int(rng.choice(LINKS))
+    radius = rng.uniform(0.02, 0.06)
+    thing = draw_thing(rng, radius, may_be_fixed=not motion.holds)
+    speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(10.0, 40.0)
+    when = len(q_free) - 1 if motion.holds else min(round(1000 * motion.meets_s), len(q_free) - 1)
+    point, normal = draw_surface_point(arm, link, rng)
+    frames = [link_frames(arm.facts, q_free[[t]]) for t in (when - 20, when)]
+    before, at = ((o[0, link] + R[0, link] @ point) for o, R in frames)
+    normal = frames[1][1][0, link] @ normal
+    centre = at + (radius + _CLEAR_M) * normal
+    if motion.holds:
+        gap, depth = 0.4 * speed, min(push_n / thing.stiffness, 0.03)
+        start = centre + gap * normal
+        arrival = motion.meets_s + depth / speed
+        obstacle = replace(
+            thing, position=_vector(start), travel=_vector(-(gap + depth) * normal), travel_s=(0.2, arrival)
+        )
+        clear = clearance(arm, q_free[:1], start) > radius
+        return Meeting(obstacle, link) if clear else None
+    velocity = (at - before) / 0.02
+    if velocity @ normal < max(0.02, 0.3 * float(np.linalg.norm(velocity))):
+        return None
+    clear = clearance(arm, q_free[: when - 10 : 10], centre) > radius
+    return Meeting(replace(thing, position=_vector(centre)), link) if clear else None
+
+
+def draw_thing(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> Obstacle:
+    """Draw a sphere of 0.5 to 5 kg on springs, log-uniform 1 to 75 kN/m, or (one in eight) a fixed one."""
+    stiffness = math.exp(rng.uniform(math.log(1e3), math.log(75e3)))
+    mass, fixed = math.exp(rng.uniform(math.log(0.5), math.log(5.0))), rng.random() < 0.125
+    return Obstacle(
+        (0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S
+    )
+
+
+def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Draw a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
+    capsules = arm.tool.capsules if link > arm.n else arm.facts.links[link - 1].capsules
+    capsule = capsules[rng.integers(len(capsules))]
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    normal = rng.standard_normal(3)
+    normal /= np.linalg.norm(normal)
+    along = end - start
+    foot = start + rng.random() * along
+    if along @ normal > 0 and rng.random() < 0.3:
+        foot = end  # a round end
+    else:
+        axis = along / np.linalg.norm(along)
+        normal -= (normal @ axis) * axis
+        normal /= np.linalg.norm(normal)
+    return foot + capsule.radius * normal, normal
+
+
+def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
+    """Give the least distance of a point from the arm's capsules over postures q (T, n), m."""
+    starts, ends, radii, _ = arm_capsules(arm.facts, arm.tool, q)
+    along = ends - starts
+    share = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
+    nearest = starts + np.clip(share, 0.0, 1.0)[..., None] * along
+    return float((np.linalg.norm(point - nearest, axis=2) - radii).min())
+
+
+def _vector(value: np.ndarray) -> Vector3:
+    x, y, z = value.tolist()
+    return (x, y, z)
