@@ -2,9 +2,11 @@
 
 from contactsafe.robot.arm import Arm, arm_from_facts
 from contactsafe.robot.facts import Tool
-from contactsafe.robot.panda import HAND, PANDA, WIPING_PAD
+from contactsafe.robot.fr3 import FR3
+from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.panda import PANDA
 
-__all__ = ["HAND", "WIPING_PAD", "panda"]
+__all__ = ["HAND", "WIPING_PAD", "fr3", "panda"]
 
 
 def panda(tool: Tool = WIPING_PAD) -> Arm:
@@ -14,3 +16,12 @@ def panda(tool: Tool = WIPING_PAD) -> Arm:
         tool: what the flange carries.
     """
     return arm_from_facts(PANDA, tool)
+
+
+def fr3(tool: Tool = WIPING_PAD) -> Arm:
+    """Give the Franka Research 3.
+
+    Args:
+        tool: what the flange carries.
+    """
+    return arm_from_facts(FR3, tool)
