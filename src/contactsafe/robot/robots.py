@@ -1,12 +1,13 @@
-"""The robots this package knows by name."""
+"""The robots this package knows by name, and the one in a user's own MJCF."""
 
 from contactsafe.robot.arm import Arm, arm_from_facts
 from contactsafe.robot.facts import Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPING_PAD
 from contactsafe.robot.panda import PANDA
+from contactsafe.robot.user_mjcf import from_mjcf
 
-__all__ = ["HAND", "WIPING_PAD", "fr3", "panda"]
+__all__ = ["HAND", "WIPING_PAD", "fr3", "from_mjcf", "panda"]
 
 
 def panda(tool: Tool = WIPING_PAD) -> Arm:
