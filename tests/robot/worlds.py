@@ -1,5 +1,8 @@
 """Scenes as users have them: an arm among other things. Nothing in them was made for this package."""
 
+import re
+from pathlib import Path
+
 import mujoco
 import numpy as np
 
@@ -7,60 +10,18 @@ from contactsafe.robot.franka import HAND
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA
 
-SIX_HOME = np.array([0.0, -0.2, 1.7, 0.0708, -1.5708, 0.0])
-"""The six-joint arm reaches forward, tool down."""
-
-SIX = """
-<mujoco model="six">
-  <compiler angle="radian"/>
-  <option timestep="0.001"/>
-  <default>
-    <joint axis="0 1 0" range="-6.28 6.28" armature="0.1"/>
-    <geom type="capsule" size="0.05"/>
-  </default>
-  <worldbody>
-    <geom name="floor" type="plane" size="2 2 0.1"/>
-    <body name="pedestal" pos="0.1 -0.2 0.3">
-      <geom type="cylinder" size="0.08 0.1"/>
-      <body name="shoulder" pos="0 0 0.163">
-        <joint name="pan" axis="0 0 1"/>
-        <geom fromto="0 0 -0.04 0 0.1 0" mass="3.7"/>
-        <body name="upper_arm" pos="0 0.138 0">
-          <joint name="lift"/>
-          <geom fromto="0 0 0 0 0 0.42" mass="8.1"/>
-          <body name="forearm" pos="0 -0.131 0.425">
-            <joint name="elbow" range="-3.14 3.14"/>
-            <geom fromto="0 0 0 0 0 0.39" size="0.04" mass="2.8"/>
-            <body name="wrist1" pos="0 0 0.392">
-              <joint name="wrist1"/>
-              <geom fromto="0 0 0 0 0.127 0" size="0.04" mass="1.4"/>
-              <body name="wrist2" pos="0 0.127 0">
-                <joint name="wrist2" axis="0 0 1"/>
-                <geom fromto="0 0 0 0 0 0.1" size="0.04" mass="1.3"/>
-                <body name="wrist3" pos="0 0 0.1">
-                  <joint name="wrist3"/>
-                  <geom fromto="0 0.02 0 0 0.05 0" size="0.035" mass="0.4"/>
-                  <site name="tip" pos="0 0.1 0" euler="-1.5708 0 0"/>
-                </body>
-              </body>
-            </body>
-          </body>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <contact><exclude body1="shoulder" body2="forearm"/><exclude body1="wrist1" body2="wrist3"/></contact>
-  <actuator>
+OWN_SCENE = (Path(__file__).parents[2] / "examples" / "own_scene.xml").read_text(encoding="utf-8")
+_MOTORS = """
     <motor joint="pan" ctrlrange="-150 150"/>
     <motor joint="lift" ctrlrange="-150 150"/>
     <motor joint="elbow" gear="100" ctrlrange="-1.5 1.5"/>
     <motor joint="wrist1" forcerange="-28 28"/>
     <motor joint="wrist2" gear="-50" forcerange="-0.56 0.56"/>
     <general joint="wrist3" gainprm="2" ctrlrange="-14 14"/>
-  </actuator>
-</mujoco>
 """
-"""Six joints of a UR5e's reach and weight, driven by motors of every manner."""
+
+SIX = re.sub(r"(?<=<actuator>).*(?=</actuator>)", _MOTORS, OWN_SCENE, flags=re.DOTALL)
+"""The six-joint arm of the examples, driven by motors of every manner; its home reaches forward, tool down."""
 
 ELBOW = """
 <mujoco>
@@ -126,10 +87,10 @@ def cell(base=(0.4, -0.3, 0.8), turn=(0.9, 0.1, -0.3, 0.2)) -> mujoco.MjModel:
         finger.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.01, 0.005, 0.02), pos=(0.0, 0.01 * side, 0.02), mass=0.1
         )
-    scene = mujoco.MjSpec.from_string(SIX)
+    scene = mujoco.MjSpec.from_string(re.sub(r"<keyframe>.*</keyframe>", "", SIX))
     panda.option.cone, panda.option.jacobian = scene.option.cone, scene.option.jacobian  # or MuJoCo warns
     scene.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.5, 0.5, 0.01), pos=(0.5, 0.0, 0.2))
-    box = scene.worldbody.add_body(name="box", pos=(0.5, 0.0, 0.3))
+    box = scene.worldbody.add_body(name="loose", pos=(0.5, 0.0, 0.3))
     box.add_freejoint()
     box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.03, 0.03, 0.03))
     stand = scene.worldbody.add_body(name="stand", pos=base, quat=np.array(turn) / np.linalg.norm(turn))
