@@ -23,3 +23,9 @@ def test_runs_and_says_something(path, capsys):
 
 def test_the_controller_alone_holds_the_tool_under_a_push():
     assert load(EXAMPLES[0]).main() < 0.01
+
+
+def test_the_box_in_ones_own_scene_is_left_alone_by_the_safe_controller_only():
+    lasting = load(EXAMPLES[3]).main()
+    assert lasting["vices"] > 40
+    assert lasting["safe"] < 10

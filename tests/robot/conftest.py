@@ -16,6 +16,11 @@ def panda():
 
 
 @pytest.fixture(scope="session")
+def fr3():
+    return robots.fr3()
+
+
+@pytest.fixture(scope="session")
 def random_arms():
     """Arms that obey no designer: every frame turned, every inertia skew."""
     rng = np.random.default_rng(2)
@@ -23,8 +28,8 @@ def random_arms():
 
 
 @pytest.fixture(scope="session")
-def arms(panda, random_arms):
-    return [panda, *random_arms]
+def arms(panda, fr3, random_arms):
+    return [panda, fr3, *random_arms]
 
 
 @pytest.fixture(scope="session")

@@ -5,14 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from contactsafe.robot.facts import Inertia
-from contactsafe.robot.panda import HAND, PANDA, WIPING_PAD
+from contactsafe.robot.fr3 import FR3
+from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.panda import PANDA
 
-BODIES = {
-    "base": PANDA.base,
-    **{f"link{index}": link.inertia for index, link in enumerate(PANDA.links, start=1)},
-    "hand": HAND.inertia,
-    "pad": WIPING_PAD.inertia,
-}
+ARMS = pytest.mark.parametrize("facts", [PANDA, FR3], ids=lambda facts: facts.name)
+BODIES = {"hand": HAND.inertia, "pad": WIPING_PAD.inertia}
+for arm in (PANDA, FR3):
+    BODIES |= {f"{arm.name} base": arm.base}
+    BODIES |= {f"{arm.name} link{index}": link.inertia for index, link in enumerate(arm.links, start=1)}
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -25,17 +26,32 @@ def test_such_a_body_can_exist(name):
     assert moments[2] <= moments[0] + moments[1]
 
 
-def test_limits_are_in_order_and_home_is_well_inside():
-    q_min, q_max, home = PANDA.joint_array("q_min"), PANDA.joint_array("q_max"), np.array(PANDA.home)
+@ARMS
+def test_limits_are_in_order_and_home_is_well_inside(facts):
+    q_min, q_max, home = facts.joint_array("q_min"), facts.joint_array("q_max"), np.array(facts.home)
     assert np.all(q_min + 0.5 < home)
     assert np.all(home < q_max - 0.5)
     for field in ("qd_max", "tau_max", "armature"):
-        assert np.all(PANDA.joint_array(field) > 0)
+        assert np.all(facts.joint_array(field) > 0)
 
 
 @pytest.mark.parametrize("link", PANDA.links)
 def test_frames_are_turned_by_unit_quaternions(link):
     assert_allclose(np.linalg.norm(link.quat), 1, rtol=0, atol=1e-12)
+
+
+@ARMS
+def test_mass_is_that_of_an_arm_of_this_size(facts):
+    """The published weight is about 18 kg, base included."""
+    assert 16 < facts.base.mass + sum(link.inertia.mass for link in facts.links) < 19
+
+
+def test_both_generations_stand_alike():
+    """One drawing serves both: frames and shape are the same, masses and limits are not."""
+    for panda, fr3 in zip(PANDA.links, FR3.links, strict=True):
+        assert (panda.position, panda.quat, panda.capsules) == (fr3.position, fr3.quat, fr3.capsules)
+        assert panda.inertia != fr3.inertia
+        assert panda.joint.tau_max == fr3.joint.tau_max
 
 
 def test_joined_bodies_keep_mass_and_centre_and_do_not_care_for_order():

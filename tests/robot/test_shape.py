@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.robot.franka import HAND, WIPING_PAD
 from contactsafe.robot.mjcf import arm_mjcf
-from contactsafe.robot.panda import HAND, PANDA, WIPING_PAD
+from contactsafe.robot.panda import PANDA
 from contactsafe.robot.shape import arm_capsules, pad_box
 
 

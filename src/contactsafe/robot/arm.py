@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.robot.binding import Binding, bind_joints
 from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
@@ -51,8 +52,8 @@ class Arm:
         name: of the robot.
         model: nominal MuJoCo model of the arm alone; rotor inertia included.
         site: end-effector point in `model`.
-        q_min, q_max: joint range, (n,), rad.
-        qd_max: joint speed limits, (n,), rad/s.
+        q_min, q_max: joint range, (n,), rad; ±inf where a joint turns without end.
+        qd_max: joint speed limits, (n,), rad/s; inf where unknown.
         tau_max: joint torque limits, (n,), N m.
         torque_rate_max: N m/s, every joint.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
@@ -78,6 +79,22 @@ class Arm:
     def n(self) -> int:
         """Number of joints."""
         return int(self.model.nv)
+
+    def bind(self, model: mujoco.MjModel, tick_s: float = 0.001) -> Binding:
+        """Find this arm's joints and motors, by the joints' names, in the model of a whole scene.
+
+        One tick of a MuJoCo loop is then `measured = Measurement(data.qpos[at.qpos], data.qvel[at.dof])`, the
+        controller's step, `data.ctrl[at.ctrl] = out.torque / at.gear`, `mj_step(model, data, at.steps)`.
+
+        Args:
+            model: of the scene.
+            tick_s: the controller's tick, `ControllerConfig.dt`, s.
+
+        Raises:
+            InvalidInputError: a joint is missing, has not exactly one motor, or the timestep does not divide the tick.
+        """
+        names = [self.model.joint(i).name for i in range(self.n)]
+        return bind_joints(names, model, tick_s)
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
@@ -131,6 +148,11 @@ def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
         where = f"[{', '.join(map(str, index))}]" if index else ""
         raise InvalidInputError(f"{name}{where} = {array[index]}; every number must be finite")
     return array
+
+
+def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
+    return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
 
 
 def _words(shape: tuple[int, ...]) -> str:

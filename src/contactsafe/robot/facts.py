@@ -38,6 +38,12 @@ class Inertia:
     com: Vector3
     tensor: tuple[float, float, float, float, float, float]
 
+    @classmethod
+    def of(cls, mass: float, com: np.ndarray, matrix: np.ndarray) -> "Inertia":
+        """Take mass, kg, centre (3,), m, and the tensor about it as a symmetric matrix (3, 3), kg m²."""
+        tensor = (matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2])
+        return cls(mass, tuple(com.tolist()), tuple(float(value) for value in tensor))  # type: ignore[arg-type]
+
     def matrix(self) -> np.ndarray:
         """Give the tensor as a symmetric matrix, (3, 3), kg m²."""
         xx, yy, zz, xy, xz, yz = self.tensor
@@ -51,8 +57,7 @@ class Inertia:
         for part in (self, other):
             r = np.array(part.com) - com
             total += part.matrix() + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
-        tensor = (total[0, 0], total[1, 1], total[2, 2], total[0, 1], total[0, 2], total[1, 2])
-        return Inertia(mass, tuple(com.tolist()), tuple(float(value) for value in tensor))  # type: ignore[arg-type]
+        return Inertia.of(mass, com, total)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError, UnreachableError
-from contactsafe.robot.arm import Arm, Pose, finite_array
+from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
 from contactsafe.robot.rotation import orientation_error, quat_to_matrix
@@ -43,8 +43,9 @@ class InverseKinematics:
     def __init__(self, arm: Arm):
         self._arm = arm
         self._nominal = arm.nominal()
-        middle = (arm.q_min + arm.q_max) / 2
-        spread = np.random.default_rng(0).uniform(arm.q_min, arm.q_max, (_SEEDS, arm.n))
+        low, high = finite_range(arm.q_min, arm.q_max)
+        middle = (low + high) / 2
+        spread = np.random.default_rng(0).uniform(low, high, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
         self._reference = trac_ik(arm)
 

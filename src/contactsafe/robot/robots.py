@@ -1,10 +1,13 @@
-"""The robots this package knows by name."""
+"""The robots this package knows by name, and the one in a user's own MJCF."""
 
 from contactsafe.robot.arm import Arm, arm_from_facts
 from contactsafe.robot.facts import Tool
-from contactsafe.robot.panda import HAND, PANDA, WIPING_PAD
+from contactsafe.robot.fr3 import FR3
+from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.panda import PANDA
+from contactsafe.robot.user_mjcf import from_mjcf
 
-__all__ = ["HAND", "WIPING_PAD", "panda"]
+__all__ = ["HAND", "WIPING_PAD", "fr3", "from_mjcf", "panda"]
 
 
 def panda(tool: Tool = WIPING_PAD) -> Arm:
@@ -14,3 +17,12 @@ def panda(tool: Tool = WIPING_PAD) -> Arm:
         tool: what the flange carries.
     """
     return arm_from_facts(PANDA, tool)
+
+
+def fr3(tool: Tool = WIPING_PAD) -> Arm:
+    """Give the Franka Research 3.
+
+    Args:
+        tool: what the flange carries.
+    """
+    return arm_from_facts(FR3, tool)

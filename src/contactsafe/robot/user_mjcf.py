@@ -1,0 +1,272 @@
+"""The arm inside a user's own MJCF: a nominal model of it alone, whatever else stands in the scene.
+
+The user's model is compiled by MuJoCo first, so that defaults, includes, meshes and inertias from geoms are resolved.
+From it a canonical chain is built, as the compiled dynamics want it: one body a joint, and each body holds all that
+is fixed to it. Its frames lie at the joints and are parallel to the world's while every joint is where the file puts
+it; dynamics and the tool's pose do not depend on that choice.
+"""
+
+import functools
+import operator
+import os
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.robot.arm import Arm, finite_array, finite_range
+from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
+from contactsafe.robot.facts import Inertia
+from contactsafe.robot.rotation import matrix_to_quat
+
+_BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
+_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+_NOTHING = 1e-12
+"""Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
+
+
+def from_mjcf(
+    scene: str | os.PathLike | mujoco.MjModel,
+    site: str,
+    joints: Sequence[str] | None = None,
+    *,
+    tau_max=None,
+    torque_rate_max: float = 1000.0,
+    friction=None,
+    home=None,
+) -> Arm:
+    """Give the arm inside a user's own MJCF scene.
+
+    The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
+    of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
+    Base pose, gravity and rotor inertia are the model's. Damping, dry friction and springs of joints are left out: the
+    controller feels them as external torque, so give `friction`, or keep them below its threshold.
+
+    Args:
+        scene: path of the MJCF file, or the model compiled from it.
+        site: end-effector point; its axes are the tool's.
+        joints: names of the arm's hinge joints from base to tip; None for all joints that move the site, if each is a
+            hinge with an actuator.
+        tau_max: torque limits, (n,), N m; None for the model's own: forcerange and, of motors, ctrlrange, times gear,
+            and actuatorfrcrange of joints. Where both are given, the smaller holds.
+        torque_rate_max: N m/s, every joint.
+        friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3); None for none.
+        home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
+
+    Returns:
+        An arm without facts and tool; a joint without limits has the range ±inf, and speed limits, which MJCF does
+        not know, are inf.
+
+    Raises:
+        InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
+            site, the choice of joints or actuators is ambiguous, torque limits are missing, or a body of the arm
+            carries its own weight (gravcomp).
+    """
+    model = _loaded(scene)
+    site_id = find(model, SITE, site)
+    chain = _chain(model, site_id, joints)
+    n = len(chain)
+    _refuse_weightless(model, chain)
+    limited = model.jnt_limited[chain].astype(bool)
+    q_min, q_max = np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
+    limits = _torque_limits(model, chain, tau_max)
+    data, key_home = _at_start(model, chain)
+    if not finite_array(torque_rate_max, (), "torque_rate_max") > 0.0:
+        raise InvalidInputError(f"torque_rate_max = {torque_rate_max} must be greater than 0; give N m/s")
+    return Arm(
+        name=model.names.split(b"\0")[0].decode(),
+        model=_nominal_model(model, data, chain, site_id, limits),
+        site=site,
+        q_min=q_min,
+        q_max=q_max,
+        qd_max=np.full(n, np.inf),
+        tau_max=limits,
+        torque_rate_max=float(torque_rate_max),
+        friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
+        home=_home(key_home if home is None else home, q_min, q_max),
+    )
+
+
+def _loaded(scene) -> mujoco.MjModel:
+    if isinstance(scene, mujoco.MjModel):
+        return scene
+    if not isinstance(scene, (str, os.PathLike)) or not os.path.isfile(scene):
+        raise InvalidInputError(
+            f"no file at '{str(scene)[:80]}'; give the path of an MJCF file, or a compiled mujoco.MjModel"
+        )
+    try:
+        return mujoco.MjModel.from_xml_path(os.fspath(scene))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InvalidInputError(f"MuJoCo cannot read '{scene}': {reason}; mend the file") from None
+
+
+def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> list[int]:
+    """Choose the arm's joints among those that move the site, from base to tip."""
+    moving = _joints_above(model, model.site_bodyid[site_id])
+    site, way = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
+    chosen = moving if names is None else [find(model, JOINT, name) for name in names]
+    if not moving or not chosen:
+        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {way}")
+    for joint in chosen:
+        kind = mujoco.mjtJoint(model.jnt_type[joint])
+        if joint not in moving:
+            problem = f"does not move site {site}; joints that do, base to tip: {way}"
+        elif kind != _HINGE:
+            word = kind.name.removeprefix("mjJNT_").lower()
+            problem = f"is of type {word}; the arm's are hinges: give joints=[...] without it, to lock it"
+        elif names is None and actuator_of(model, joint) is None:
+            problem = "has no actuator; give joints=[...] with it, or without it, to lock it"
+        else:
+            continue
+        raise InvalidInputError(f"joint {label(model, JOINT, joint)} {problem}")
+    if chosen != [joint for joint in moving if joint in chosen]:
+        raise InvalidInputError(f"joints = {list(names or ())} are not in order; from base to tip they stand so: {way}")
+    return chosen
+
+
+def _joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+    """Find all joints between the world and a body, from the world on."""
+    joints: list[int] = []
+    while body != 0:
+        first = model.body_jntadr[body]
+        joints[:0] = range(first, first + model.body_jntnum[body])
+        body = model.body_parentid[body]
+    return joints
+
+
+def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
+    """Tell which link each body is part of, (nbody,): 1 … n, 0 for what the arm does not move."""
+    moved_by = {int(model.jnt_bodyid[joint]): link for link, joint in enumerate(chain, start=1)}
+    link_of = np.zeros(model.nbody, dtype=int)
+    for body in range(1, model.nbody):
+        link_of[body] = moved_by.get(body, link_of[model.body_parentid[body]])
+    return link_of
+
+
+def _refuse_weightless(model: mujoco.MjModel, chain: list[int]) -> None:
+    floating = np.flatnonzero((_link_of(model, chain) > 0) & (model.body_gravcomp != 0.0))
+    if floating.size:
+        raise InvalidInputError(
+            f"body {label(model, _BODY, floating[0])} has gravcomp = {model.body_gravcomp[floating[0]]:g}; "
+            "the controller's torque includes gravity, so it must be 0 on every body of the arm"
+        )
+
+
+def _torque_limits(model: mujoco.MjModel, chain: list[int], given) -> np.ndarray:
+    limits = np.array([_torque_limit(model, joint) for joint in chain])
+    if given is not None:
+        limits = np.minimum(limits, finite_array(given, limits.shape, "tau_max"))
+    for joint, limit in zip(chain, limits, strict=True):
+        if not 0.0 < limit < np.inf:
+            found = "no torque limit" if limit > 0.0 else f"a torque limit of {limit:g} N m, which is not above 0"
+            raise InvalidInputError(
+                f"joint {label(model, JOINT, joint)} has {found}; give tau_max=[...], {len(chain)} numbers in N m, "
+                "and its motor a forcerange on both sides of 0"
+            )
+    return limits
+
+
+def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
+    """Give what the model lets the joint's actuator do in both directions, N m; inf where it does not say."""
+    ranges = []
+    if model.jnt_actfrclimited[joint]:
+        ranges.append(model.jnt_actfrcrange[joint])
+    actuator = actuator_of(model, joint)
+    if actuator is not None and model.actuator_forcelimited[actuator]:
+        ranges.append(model.actuator_gear[actuator, 0] * model.actuator_forcerange[actuator])
+    if actuator is not None and model.actuator_ctrllimited[actuator] and torque_per_control(model, actuator) != 0.0:
+        ranges.append(torque_per_control(model, actuator) * model.actuator_ctrlrange[actuator])
+    return min((max(0.0, min(-min(ends), max(ends))) for ends in ranges), default=np.inf)
+
+
+def _at_start(model: mujoco.MjModel, chain: list[int]) -> tuple[mujoco.MjData, np.ndarray | None]:
+    """Place all bodies with the arm's joints unturned and the others locked; give the arm's key frame 'home' too."""
+    data = mujoco.MjData(model)
+    address = model.jnt_qposadr[chain]
+    key = mujoco.mj_name2id(model, _KEY, "home")
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    home = data.qpos[address].copy() if key >= 0 else None
+    data.qpos[address] = model.qpos0[address]
+    mujoco.mj_kinematics(model, data)
+    return data, home
+
+
+def _home(home, q_min: np.ndarray, q_max: np.ndarray) -> np.ndarray:
+    if home is None:
+        return np.mean(finite_range(q_min, q_max), axis=0)
+    home = finite_array(home, q_min.shape, "home")
+    outside = (home < q_min) | (home > q_max)
+    if outside.any():
+        i = int(np.argmax(outside))
+        raise InvalidInputError(f"home[{i}] = {home[i]:g} rad is outside [{q_min[i]:g}, {q_max[i]:g}]; move it inside")
+    return home
+
+
+def _nominal_model(
+    model: mujoco.MjModel, data: mujoco.MjData, chain: list[int], site_id: int, limits: np.ndarray
+) -> mujoco.MjModel:
+    """Build the arm alone: bodies `link1` … `link<n>`, joints and site of the user's names, a motor a joint."""
+    spec = mujoco.MjSpec()
+    spec.modelname = model.names.split(b"\0")[0].decode()
+    spec.compiler.degree = False
+    spec.option.timestep = 0.001
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    spec.option.gravity = np.zeros(3) if weightless else model.opt.gravity
+    body, origin, link_of = spec.worldbody, np.zeros(3), _link_of(model, chain)
+    for link, (joint, limit) in enumerate(zip(chain, limits, strict=True), start=1):
+        name = mujoco.mj_id2name(model, JOINT, joint)
+        body = body.add_body(name=f"link{link}", pos=data.xanchor[joint] - origin)
+        origin = data.xanchor[joint]
+        _set_inertia(body, _inertias(model, data, link_of == link, origin))
+        body.add_joint(
+            name=name,
+            type=_HINGE,
+            axis=data.xaxis[joint],
+            ref=model.qpos0[model.jnt_qposadr[joint]],
+            limited=bool(model.jnt_limited[joint]),
+            range=model.jnt_range[joint],
+            armature=_rotor(model, joint),
+        )
+        motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.set_to_motor()
+        motor.ctrllimited, motor.ctrlrange = True, (-limit, limit)
+    quat = matrix_to_quat(data.site_xmat[site_id].reshape(3, 3))
+    body.add_site(name=mujoco.mj_id2name(model, SITE, site_id), pos=data.site_xpos[site_id] - origin, quat=quat)
+    return spec.compile()
+
+
+def _rotor(model: mujoco.MjModel, joint: int) -> float:
+    """Give the rotor inertia felt at a joint, kg m²: its own armature, and the actuator's through the gear."""
+    armature = float(model.dof_armature[model.jnt_dofadr[joint]])
+    actuator = actuator_of(model, joint)
+    if actuator is not None:
+        armature += float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
+    return armature
+
+
+def _inertias(model: mujoco.MjModel, data: mujoco.MjData, part: np.ndarray, origin: np.ndarray) -> list[Inertia]:
+    """Give the inertia of bodies as they stand, in world axes and from an origin (3,), m; part: which, (nbody,)."""
+    found = []
+    for body in np.flatnonzero(part & (model.body_mass > 0.0)):
+        axes = data.ximat[body].reshape(3, 3)
+        tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
+        found.append(Inertia.of(float(model.body_mass[body]), data.xipos[body] - origin, tensor))
+    return found
+
+
+def _set_inertia(body, parts: list[Inertia]) -> None:
+    """Give a body of the canonical chain the mass of its parts, in principal axes."""
+    body.explicitinertial = True
+    if not parts:
+        body.mass, body.inertia = _NOTHING, np.full(3, _NOTHING)
+        return
+    total = functools.reduce(operator.add, parts)
+    moments, axes = np.linalg.eigh(total.matrix())
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    moments = np.maximum(moments, _NOTHING)
+    moments[2] = min(moments[2], moments[0] + moments[1])  # rounding may exceed what MuJoCo allows a thin plate
+    body.mass, body.ipos, body.iquat, body.inertia = total.mass, total.com, matrix_to_quat(axes), moments
