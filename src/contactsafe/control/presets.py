@@ -48,6 +48,8 @@ def safe() -> ControllerConfig:
         push_hold_nm=22.0,
         push_yield_n=10.0,
         push_hold_n=35.0,
+        push_meet_n=25.0,
+        probe_m=0.001,
         push_tool_n=20.0,
         hold_recover_s=0.03,
     )

@@ -102,7 +102,12 @@ def state_dtype(n: int) -> np.dtype:
             ("hold_s", _f),  # time constant with which it falls, s
             ("quiet_ticks", _i),  # ticks since the residual was above the threshold
             ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
-            ("contact_link", _i),  # link seen last in contact, 1 … n
+            ("contact_link", _i),  # link that the contact is on, 1 … n
+            ("lever", _f),  # joint torque per newton there, m
+            ("lever_most", _f),  # the same, were the push not along the surface's normal, m
+            ("search_at", _i),  # next point of the skin to be searched
+            ("search_point", _i),  # best one of this search so far, −1 for none
+            ("search_fit", _f),  # cosine between its torque and the one found
             ("task_share", _f),  # of what pulls to the target in force, 0 … 1
             ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
             ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s

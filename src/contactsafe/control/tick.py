@@ -21,12 +21,19 @@ from contactsafe.control.laws import (
     tool_share,
 )
 from contactsafe.control.records import CONTACT, FREE
-from contactsafe.robot.dynamics import contact_lever, update_dynamics
+from contactsafe.robot.contact import best_point, contact_lever, skin_torque
+from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 _LOST_AFTER_TICKS = 20
+
+_POINTS_A_TICK = 60
+"""Points of the skin that are searched for the contact in one tick."""
+
+_LEAST_LEVER = 0.03
+"""No contact counts as nearer to all axes than this, m: its force would be anybody's guess."""
 
 _ABSURD = 1e6
 """No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
@@ -192,15 +199,40 @@ def _supervise(c):
     if state.mode == CONTACT:
         if link != 0:
             state.direction[:] = state.residual_trigger / math.sqrt(dot(state.residual_trigger, state.residual_trigger))
-            state.contact_link = link
+            _locate(c, link)
     _watch_push(c)
-    c.output.link = link
+    c.output.link = 0 if link == 0 else state.contact_link
+
+
+@compiled
+def _locate(c, link):
+    """Look for the contact on the skin, a part of it each tick; until the first search is through, judge by the link."""
+    state = c.state
+    if state.contact_link == 0:
+        state.contact_link = link
+        state.lever = contact_lever(c.handle, link, state.direction)
+        state.lever_most = state.lever
+    if state.search_at == 0:
+        state.search_point, state.search_fit = -1, 0.0
+    stop = min(state.search_at + _POINTS_A_TICK, c.handle.skin_points)
+    torque = np.empty(state.direction.shape[0])
+    state.search_point, state.search_fit = best_point(
+        c.handle, state.search_at, stop, state.direction, torque, state.search_point, state.search_fit
+    )
+    state.search_at = stop
+    if stop == c.handle.skin_points:
+        state.search_at = 0
+        if state.search_point >= 0:
+            state.contact_link = skin_torque(c.handle, state.search_point, torque)
+            state.lever = max(math.sqrt(dot(torque, torque)), _LEAST_LEVER)
+            state.lever_most = max(state.lever, contact_lever(c.handle, state.contact_link, state.direction))
 
 
 @compiled
 def _enter(state, mode):
     state.mode, state.mode_ticks = mode, 0
     state.moved_rad, state.moved_smooth_rad, state.torque_smooth_nm, state.reference_nm = 0.0, 0.0, 0.0, 0.0
+    state.contact_link, state.search_at = 0, 0
     state.judge_rad, state.holding, state.hold_s, state.hold_nm = math.inf, 0, 0.0, math.nan
 
 
@@ -215,9 +247,9 @@ def _watch_push(c):
     observer_step(state.velocity_seen, params.lowpass_share, state.velocity_observed)
     if state.mode != CONTACT:
         return
-    lever = contact_lever(c.handle, state.contact_link, state.direction)
+    lever = state.lever
     if math.isnan(state.hold_nm):
-        state.hold_nm = params.push_meet_n * _longest_lever(c)
+        state.hold_nm = params.push_meet_n * lever
     state.moved_rad += params.dt * dot(state.direction, state.velocity_seen)
     torque = dot(state.direction, state.residual_trigger)
     state.torque_smooth_nm += params.probe_share * (torque - state.torque_smooth_nm)
@@ -323,21 +355,9 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
 @compiled
 def _push_limit(c):
     """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
-    params, link, direction = c.params, c.state.contact_link, c.state.direction
-    lever = contact_lever(c.handle, link, direction)
+    params, lever = c.params, c.state.lever
     limit = min(params.push_yield_nm, params.push_yield_n * lever)
-    if not c.state.hold_nm > limit:
-        return limit
-    return max(limit, min(c.state.hold_nm, params.push_hold_nm, params.push_hold_n * _longest_lever(c)))
-
-
-@compiled
-def _longest_lever(c):
-    """Longest lever arm of the links that the contact may be on: the link found is the least, near links show less."""
-    lever = 0.0
-    for link in range(c.state.contact_link, c.state.direction.shape[0] + 1):
-        lever = max(lever, contact_lever(c.handle, link, c.state.direction))
-    return lever
+    return max(limit, min(c.state.hold_nm, params.push_hold_nm, params.push_hold_n * c.state.lever_most))
 
 
 @compiled

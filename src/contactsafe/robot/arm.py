@@ -1,6 +1,6 @@
 """An arm as the controller knows it: a nominal model, its limits, its tool."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import mujoco
@@ -12,6 +12,7 @@ from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
 from contactsafe.robot.rotation import matrix_to_quat
+from contactsafe.robot.skin import SKIN_COLUMNS, capsule_skin
 
 
 class Pose(NamedTuple):
@@ -33,15 +34,15 @@ class NominalModel:
         handle: `handle_dtype` record for compiled code.
     """
 
-    def __init__(self, model: mujoco.MjModel, site: str):
+    def __init__(self, model: mujoco.MjModel, site: str, skin: np.ndarray):
         self._model = model
         self._data = mujoco.MjData(model)
-        self._site = site
-        self.handle = make_handle(model, self._data, site)[0]
+        self._site, self._skin = site, np.ascontiguousarray(skin, dtype=float)
+        self.handle = make_handle(model, self._data, site, self._skin)[0]
 
     def __reduce__(self):
         """Pickle by building anew: addresses mean nothing in another process."""
-        return NominalModel, (self._model, self._site)
+        return NominalModel, (self._model, self._site, self._skin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,7 @@ class Arm:
         home: a posture well inside the limits, (n,), rad.
         facts: what the model was generated from; None for a user's own.
         tool: what the flange carries; None for a user's own.
+        skin: points of the links' surface, (P, 7), rows as in `contactsafe.robot.skin`; empty where unknown.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Arm:
     home: np.ndarray
     facts: ArmFacts | None = None
     tool: Tool | None = None
+    skin: np.ndarray = field(default_factory=lambda: np.zeros((0, SKIN_COLUMNS)))
 
     @property
     def n(self) -> int:
@@ -98,7 +101,7 @@ class Arm:
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site)
+        return NominalModel(self.model, self.site, self.skin)
 
     def joint_vector(self, value, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.
@@ -174,4 +177,5 @@ def arm_from_facts(facts: ArmFacts, tool: Tool) -> Arm:
         home=np.array(facts.home),
         facts=facts,
         tool=tool,
+        skin=capsule_skin(facts),
     )

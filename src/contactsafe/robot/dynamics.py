@@ -4,13 +4,11 @@ The numbers come from MuJoCo on a model of the arm alone; this file asks for the
 not give by itself: gravity apart from Coriolis torque, Cᵀ q̇, and J̇ q̇, all exact (no differences in time).
 """
 
-import math
-
 import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import cross_into, dot, matvec, spd_inverse
+from contactsafe.robot.linalg import cross_into, dot, spd_inverse
 from contactsafe.robot.native import (
     mj_comPos,
     mj_comVel,
@@ -24,12 +22,13 @@ from contactsafe.robot.native import (
 )
 
 _VIEWED = (
-    "qpos", "qvel", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot", "cvel", "cinert",
+    "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot", "cvel", "cinert",
 )  # fmt: skip
 
 handle_dtype = np.dtype(
-    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass")]
+    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "skin")]
     + [
+        ("skin_points", np.int64),
         ("site", np.int64),
         ("first_body", np.int64),
         ("tool_body", np.int64),
@@ -59,15 +58,16 @@ def dynamics_dtype(n: int) -> np.dtype:
     )
 
 
-def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str) -> np.ndarray:
+def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str, skin: np.ndarray) -> np.ndarray:
     """Fill a handle for a model of one serial arm, array of one `handle_dtype` record.
 
-    The caller keeps `model` and `data` alive for as long as the handle is used.
+    The caller keeps `model`, `data` and `skin` (rows as in `contactsafe.robot.skin`) alive while the handle is used.
     """
     handle = np.zeros(1, dtype=handle_dtype)
     handle["model"], handle["data"] = model._address, data._address
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
+    handle["skin"], handle["skin_points"] = skin.ctypes.data, len(skin)
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id
     handle["site"] = site_id
@@ -125,44 +125,6 @@ def _gravity(handle, n, g):
             weight[k] = subtree_mass[body] * handle.gravity[k]
         cross_into(arm, weight, torque)
         g[i] = -dot(xaxis[i], torque)
-
-
-_LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m
-
-
-@compiled
-def contact_lever(handle, link, direction):
-    """Give the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
-
-    With J_p the Jacobian of the link's centre of mass, the least force there that explains a joint torque τ is
-    (J_p J_pᵀ)⁻¹ J_p τ; a little damping keeps it finite where the link cannot be moved along some axis. The handle
-    must have been brought up to date by `update_dynamics`.
-
-    Args:
-        handle: of the nominal model.
-        link: in contact, 1 … n.
-        direction: unit joint-space direction of the contact's torque, (n,), N m.
-    """
-    n = direction.shape[0]
-    xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
-    point = view2(handle.xipos, handle.nbody, 3)[handle.first_body + link - 1]
-    J, arm = np.zeros((3, n)), np.empty(3)
-    column = np.empty(3)
-    for i in range(link):
-        for k in range(3):
-            arm[k] = point[k] - xanchor[i, k]
-        cross_into(xaxis[i], arm, column)
-        for k in range(3):
-            J[k, i] = column[k]
-    A, A_inv = np.zeros((3, 3)), np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            A[i, j] = dot(J[i], J[j])
-        A[i, i] += _LEVER_DAMPING
-    spd_inverse(A, A_inv)
-    force = matvec(A_inv, matvec(J, direction))
-    size = math.sqrt(dot(force, force))
-    return _LEVER_MAX if size * _LEVER_MAX < 1.0 else 1.0 / size
 
 
 @compiled

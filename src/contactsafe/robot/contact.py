@@ -1,0 +1,111 @@
+"""Where on an arm something touches it, from the joint torque alone; compiled.
+
+A contact without friction pushes along the surface's normal, so each point of the skin has one direction of joint
+torque, t = J_pᵀ n; the point whose t is nearest in angle to the torque found explains it best (Manuelli & Tedrake 2016
+search the same way with particles). What gives no torque, near a joint's axis, cannot be told apart by anybody.
+"""
+
+import math
+
+from numpy import empty, zeros
+
+from contactsafe.compiled import compiled
+from contactsafe.robot.linalg import cross_into, dot, matvec, spd_inverse
+from contactsafe.robot.native import view1, view2
+from contactsafe.robot.skin import SKIN_COLUMNS
+
+_LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m
+
+
+@compiled
+def contact_lever(handle, link, direction):
+    """Give the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
+
+    With J_p the Jacobian of the link's centre of mass, the least force there that explains a joint torque τ is
+    (J_p J_pᵀ)⁻¹ J_p τ; a little damping keeps it finite where the link cannot be moved along some axis. The handle
+    must have been brought up to date by `update_dynamics`.
+
+    Args:
+        handle: of the nominal model.
+        link: in contact, 1 … n.
+        direction: unit joint-space direction of the contact's torque, (n,), N m.
+    """
+    n = direction.shape[0]
+    xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
+    point = view2(handle.xipos, handle.nbody, 3)[handle.first_body + link - 1]
+    J, arm = zeros((3, n)), empty(3)
+    column = empty(3)
+    for i in range(link):
+        for k in range(3):
+            arm[k] = point[k] - xanchor[i, k]
+        cross_into(xaxis[i], arm, column)
+        for k in range(3):
+            J[k, i] = column[k]
+    A, A_inv = zeros((3, 3)), zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            A[i, j] = dot(J[i], J[j])
+        A[i, i] += _LEVER_DAMPING
+    spd_inverse(A, A_inv)
+    force = matvec(A_inv, matvec(J, direction))
+    size = math.sqrt(dot(force, force))
+    return _LEVER_MAX if size * _LEVER_MAX < 1.0 else 1.0 / size
+
+
+@compiled
+def skin_torque(handle, index, out):
+    """Fill the joint torque that 1 N on a point of the skin, inwards along its normal, puts on the arm, (n,), N m.
+
+    Args:
+        handle: of the nominal model, brought up to date by `update_dynamics`.
+        index: of the point.
+        out: (n,).
+
+    Returns:
+        The link that the point is on, 1 … n.
+    """
+    n = out.shape[0]
+    row = view2(handle.skin, handle.skin_points, SKIN_COLUMNS)[index]
+    link = int(row[0])
+    body = handle.first_body + link - 1
+    R = view2(handle.xmat, handle.nbody, 9)[body]
+    origin = view2(handle.xpos, handle.nbody, 3)[body]
+    xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
+    point, push, arm, moment = empty(3), empty(3), empty(3), empty(3)
+    for k in range(3):
+        point[k] = origin[k] + R[3 * k] * row[1] + R[3 * k + 1] * row[2] + R[3 * k + 2] * row[3]
+        push[k] = -(R[3 * k] * row[4] + R[3 * k + 1] * row[5] + R[3 * k + 2] * row[6])
+    for i in range(n):
+        out[i] = 0.0
+        if i < link:
+            for k in range(3):
+                arm[k] = point[k] - xanchor[i, k]
+            cross_into(arm, push, moment)
+            out[i] = dot(xaxis[i], moment)
+    return link
+
+
+@compiled
+def best_point(handle, start, stop, torque, scratch, best, best_fit):
+    """Search part of the skin for the point that explains a joint torque best.
+
+    Args:
+        handle: of the nominal model.
+        start, stop: points searched.
+        torque: of the contact on the arm, (n,), N m.
+        scratch: (n,); overwritten.
+        best: the best point of those searched before, −1 for none.
+        best_fit: its fit, the cosine between its torque and the one found.
+
+    Returns:
+        The best point so far and its fit.
+    """
+    for index in range(start, stop):
+        skin_torque(handle, index, scratch)
+        along = dot(scratch, torque)
+        if along <= 0.0:
+            continue
+        fit = along / math.sqrt(dot(scratch, scratch) * dot(torque, torque))
+        if fit > best_fit:
+            best, best_fit = index, fit
+    return best, best_fit
