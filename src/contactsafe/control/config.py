@@ -10,7 +10,7 @@ from contactsafe.errors import InvalidInputError
 _PER_JOINT = ("K_pose", "D_pose")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
-    "push_yield_n", "push_hold_n", "push_tool_n",
+    "push_yield_n", "push_hold_n", "push_tool_n", "error_max_m", "error_max_rad", "tank_j",
 )  # fmt: skip
 
 
@@ -27,6 +27,12 @@ class ControllerConfig:
         trigger_gain: K_I of the residual that triggers, names the link and gives the direction, 1/s.
         residual_cutoff_hz: low-pass behind both residuals, Hz; inf for none.
         residual_threshold: δ, N m.
+        friction_uncertainty: share of the nominal friction torque that is added to δ.
+        inertia_uncertainty: share of the inertial torque that is added to δ.
+        mass_uncertainty: standard deviation of the links' relative mass error, which is learned while nothing touches
+            the arm; 0 to trust the model.
+        payload_uncertainty_kg: the same of the tool's mass, kg.
+        tool_memory_s: without a force sensor: time constant of the tool's wrench as it was before a contact, s.
         dwell_s: t_c, least time in contact mode, s.
         release_s: time the residual must have stayed below δ before contact mode ends, s.
         recover_s: time constant with which the task's pull comes back after it gave way to a contact, s; 0 for at once.
@@ -55,6 +61,12 @@ class ControllerConfig:
         joint_stop_damping: N m s/rad.
         manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
         manipulability_damping: λ² at a singularity.
+        error_max_m: the tool is pulled as if x_d were no further away than this, m.
+        error_max_rad: nor turned away further, rad.
+        passive_gains: raise stiffness and damping no faster than keeps the impedance stable whatever is asked.
+        tank_j: energy that the command may give at once, J; inf for no bound.
+        tank_power_w: power that it may give for ever, W.
+        tank_s: least time in which it may give what the tank holds, s.
         torque_rate_fraction: share of the arm's torque-rate limit that is used.
         dt: tick, s.
     """
@@ -67,6 +79,11 @@ class ControllerConfig:
     trigger_gain: float = 1.5
     residual_cutoff_hz: float = 30.0
     residual_threshold: float = 1.5
+    friction_uncertainty: float = 0.0
+    inertia_uncertainty: float = 0.0
+    mass_uncertainty: float = 0.0
+    payload_uncertainty_kg: float = 0.0
+    tool_memory_s: float = 0.05
     dwell_s: float = 0.05
     release_s: float = 0.0
     recover_s: float = 0.0
@@ -95,6 +112,12 @@ class ControllerConfig:
     joint_stop_damping: float = 30.0
     manipulability_floor: float = 1e-2
     manipulability_damping: float = 0.05
+    error_max_m: float = math.inf
+    error_max_rad: float = math.inf
+    passive_gains: bool = False
+    tank_j: float = math.inf
+    tank_power_w: float = 0.0
+    tank_s: float = 0.1
     torque_rate_fraction: float = 0.999
     dt: float = 0.001
 

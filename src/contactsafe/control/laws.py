@@ -215,28 +215,103 @@ def observer_step(residual, share, tau_external):
 
 
 @compiled
-def joint_stop_torque(q, qd, q_min, q_max, margin, stiffness, damping):
-    """Push joints back that come within a margin of their range: a one-sided spring and damper.
+def weigh(mass_error, covariance, row, torque, variance):
+    """Learn in place what the links weigh from one joint's gravity torque: one step of a Kalman filter.
 
     Args:
+        mass_error: relative error of each link's mass, (m,); updated.
+        covariance: of it, (m, m); updated.
+        row: gravity torque of the joint per relative error, (m,), N m.
+        torque: found at the joint beyond the model's, N m.
+        variance: of that reading, (N m)².
+    """
+    P_row = matvec(covariance, row)
+    share = 1.0 / (dot(row, P_row) + variance)
+    for i in range(row.shape[0]):
+        mass_error[i] += P_row[i] * share * torque
+        for j in range(row.shape[0]):
+            covariance[i, j] -= P_row[i] * share * P_row[j]
+
+
+@compiled
+def clip_error(error, length_max, angle_max):
+    """Shorten a pose error in place to a largest distance and a largest angle; (6,), m and rad."""
+    for first, most in ((0, length_max), (3, angle_max)):
+        size = math.sqrt(dot(error[first : first + 3], error[first : first + 3]))
+        if size > most:
+            for i in range(first, first + 3):
+                error[i] *= most / size
+
+
+@compiled
+def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
+    """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
+
+    Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016, eq. 12), each axis by
+    itself. Falling gains are free.
+
+    Args:
+        K, D: in force, (6,), 1/s² and 1/s; updated.
+        K_wanted, D_wanted: (6,).
+        dt: tick, s.
+        damping_min: α, least damping that may ever be asked for, 1/s.
+        limited: whether to limit at all.
+    """
+    for i in range(6):
+        way = K_wanted[i] - K[i] + damping_min * (D_wanted[i] - D[i])
+        most = 2.0 * damping_min * K[i] * dt
+        share = most / way if limited and way > most else 1.0
+        K[i] += share * (K_wanted[i] - K[i])
+        D[i] += share * (D_wanted[i] - D[i])
+
+
+@compiled
+def power_limit(tau_net, qd, tank, power, drain_s):
+    """Damp a command in place so that it gives the arm no more power than a tank of energy can pay.
+
+    The tank is filled with a steady power and by what the command takes out of the arm. Its level falls no faster than
+    level/drain_s beyond that power; the torque taken off is the smallest that does it, along q̇.
+
+    Args:
+        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
+        qd: (n,), rad/s.
+        tank: level, J.
+        power: steady, W.
+        drain_s: s.
+    """
+    allowed = power + max(tank, 0.0) / drain_s
+    given = dot(tau_net, qd)
+    if given > allowed:
+        speed = dot(qd, qd)
+        for i in range(qd.shape[0]):
+            tau_net[i] -= (given - allowed) / speed * qd[i]
+
+
+@compiled
+def joint_stop_torque(tau_net, q, qd, q_min, q_max, margin, stiffness, damping):
+    """Keep joints in their range, in place: within a margin of it, what pushes outwards fades and a spring pushes back.
+
+    A damper acts on motion towards the limit, rising over the margin, so that the stop is reached slowly. It never
+    pulls a joint towards its limit, and away from the limits changes nothing.
+
+    Args:
+        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
         q, qd: (n,), rad and rad/s.
         q_min, q_max: range, (n,), rad.
         margin: rad.
         stiffness: N m/rad of intrusion.
-        damping: N m s/rad, only against motion towards the limit, rising over the margin.
-
-    Returns:
-        Torque, (n,), N m; zero away from the limits.
+        damping: N m s/rad.
     """
-    out = np.zeros(q.shape[0])
     for i in range(q.shape[0]):
-        low = q_min[i] + margin - q[i]
-        high = q[i] - (q_max[i] - margin)
-        if low > 0.0:
-            out[i] = stiffness * low - damping * min(low / margin, 1.0) * min(qd[i], 0.0)
-        elif high > 0.0:
-            out[i] = -stiffness * high - damping * min(high / margin, 1.0) * max(qd[i], 0.0)
-    return out
+        low, high = (q_min[i] + margin - q[i]) / margin, (q[i] - q_max[i] + margin) / margin
+        inward, depth = (1.0, low) if low > high else (-1.0, high)
+        if depth <= 0.0:
+            continue
+        outward = max(-inward * tau_net[i], 0.0)
+        closing = max(-inward * qd[i], 0.0)
+        tau_net[i] += inward * (
+            min(depth, 1.0) * (outward + damping * closing) + stiffness * margin * depth * max(depth, 1.0)
+        )
 
 
 @compiled

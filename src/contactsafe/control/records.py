@@ -55,7 +55,15 @@ def target_dtype(n: int) -> np.dtype:
     )
 
 
-_SHARES = ("trigger_share", "observer_share", "lowpass_share", "recover_share", "probe_share", "hold_share")
+_SHARES = (
+    "trigger_share",
+    "observer_share",
+    "lowpass_share",
+    "recover_share",
+    "probe_share",
+    "hold_share",
+    "tool_share",
+)
 """Parts of their way that first-order filters go in one tick."""
 
 
@@ -73,7 +81,7 @@ def params_dtype(n: int) -> np.dtype:
         + [(name, _f) for name in _SHARES]
         + [("dwell_ticks", _i), ("release_ticks", _i)]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
-        + [("friction", _f, (n, 3))]
+        + [("friction", _f, (n, 3)), ("mass_variance", _f, (n + 1,))]
     )
 
 
@@ -99,7 +107,23 @@ def state_dtype(n: int) -> np.dtype:
             ("judge_rad", _f),  # where it is judged next whether something pushes
             ("reference_nm", _f),  # contact torque then, N m
             ("hold_nm", _f),  # push limit while holding, N m
+            ("meet_n", _f),  # push limit with which the contact was met, falling, N
             ("hold_s", _f),  # time constant with which it falls, s
+            ("observed_rate", _f, (n,)),  # momentum's rate of change through the triggering observer's filter, N m
+            ("momentum_rate", _f, (n,)),  # the same behind the low-pass, N m
+            ("tool_wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
+            ("arm_torque", _f, (n,)),  # residual less the tool's share, compensating, N m
+            ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
+            ("alarm", _f, (n,)),  # what is held against the thresholds, N m
+            ("threshold", _f, (n,)),  # N m
+            ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
+            ("mass_covariance", _f, (n + 1, n + 1)),
+            ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
+            ("turn", _i),  # joint whose residual is weighed next
+            ("ticks", _i),  # since reset
+            ("K_task", _f, (6,)),  # in force, 1/s²
+            ("D_task", _f, (6,)),  # in force, 1/s
+            ("tank_j", _f),  # energy that the command may still give, J
             ("quiet_ticks", _i),  # ticks since the residual was above the threshold
             ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
             ("contact_link", _i),  # link that the contact is on, 1 … n
@@ -171,6 +195,8 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["release_ticks"] = round(config.release_s / dt)
     params["recover_share"] = share_per_tick(config.recover_s, dt)
     params["probe_share"] = share_per_tick(config.probe_s, dt)
+    params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
+    params["mass_variance"] = _mass_variance(config, arm)
     params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
     params["D_pose"] = _per_joint(config.D_pose, arm.n)
@@ -181,6 +207,15 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
 def share_per_tick(time_constant_s: float, dt: float) -> float:
     """Give the share of its way that a first-order filter goes in one tick; all of it where its time constant is 0."""
     return 1.0 - math.exp(-dt / time_constant_s) if time_constant_s > 0 else 1.0
+
+
+def _mass_variance(config: ControllerConfig, arm: Arm) -> np.ndarray:
+    """Variance of the relative mass error of each link and of the tool, (n + 1,)."""
+    model = arm.model
+    tool_kg = float(model.body_mass[int(model.jnt_bodyid[0]) + arm.n :].sum())
+    variance = np.full(arm.n + 1, config.mass_uncertainty**2)
+    variance[-1] = (config.payload_uncertainty_kg / tool_kg) ** 2 if tool_kg > 0 else 0.0
+    return variance
 
 
 def _per_joint(values: tuple[float, ...], n: int) -> np.ndarray:

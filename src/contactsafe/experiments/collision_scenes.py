@@ -120,7 +120,7 @@ def draw_plant(rng: np.random.Generator, n: int) -> PlantConfig:
 def draw_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
     """Draw what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or wiping."""
     rng, board = scene_rng(seed, 0), board or BoardConfig()
-    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.2, rng.random() < 0.5
     speed = rng.uniform(0.1, 0.3 if wiping else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)
@@ -189,7 +189,7 @@ def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.G
     link = int(rng.choice(LINKS))
     radius = rng.uniform(0.02, 0.06)
     thing = draw_thing(rng, radius, may_be_fixed=not motion.holds)
-    speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(10.0, 40.0)
+    speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(2.0, 10.0)
     when = len(q_free) - 1 if motion.holds else min(round(1000 * motion.meets_s), len(q_free) - 1)
     point, normal = draw_surface_point(arm, link, rng)
     frames = [link_frames(arm.facts, q_free[[t]]) for t in (when - 20, when)]
@@ -216,9 +216,7 @@ def draw_thing(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> O
     """Draw a sphere of 0.5 to 5 kg on springs, log-uniform 1 to 75 kN/m, or (one in eight) a fixed one."""
     stiffness = math.exp(rng.uniform(math.log(1e3), math.log(75e3)))
     mass, fixed = math.exp(rng.uniform(math.log(0.5), math.log(5.0))), rng.random() < 0.125
-    return Obstacle(
-        (0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S
-    )
+    return Obstacle((0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S)
 
 
 def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from numpy import empty, zeros
 
 from contactsafe.compiled import compiled
 from contactsafe.robot.linalg import cross_into, dot, matvec, spd_inverse
-from contactsafe.robot.native import view1, view2
+from contactsafe.robot.native import view2
 from contactsafe.robot.skin import SKIN_COLUMNS
 
 _LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m

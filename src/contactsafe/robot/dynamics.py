@@ -26,7 +26,7 @@ _VIEWED = (
 )  # fmt: skip
 
 handle_dtype = np.dtype(
-    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "skin")]
+    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "skin")]
     + [
         ("skin_points", np.int64),
         ("site", np.int64),
@@ -54,6 +54,7 @@ def dynamics_dtype(n: int) -> np.dtype:
             ("position", f, (3,)),  # tool point, world, m
             ("rotation", f, (3, 3)),  # tool axes, world
             ("velocity", f, (6,)),  # J q̇, m/s and rad/s
+            ("mass_regressor", f, (n, n + 1)),  # of `mass_regressor`, N m
         ]
     )
 
@@ -68,6 +69,7 @@ def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str, skin: np.
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
     handle["skin"], handle["skin_points"] = skin.ctypes.data, len(skin)
+    handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id
     handle["site"] = site_id
@@ -125,6 +127,28 @@ def _gravity(handle, n, g):
             weight[k] = subtree_mass[body] * handle.gravity[k]
         cross_into(arm, weight, torque)
         g[i] = -dot(xaxis[i], torque)
+
+
+@compiled
+def mass_regressor(handle, out):
+    """Fill the gravity torque of each joint per relative error of each link's mass, (n, n + 1), N m.
+
+    The last column is of what the last link carries as bodies of its own: the tool. The handle must have been brought
+    up to date by `update_dynamics`.
+    """
+    n = out.shape[0]
+    com, mass = view2(handle.xipos, handle.nbody, 3), view1(handle.body_mass, handle.nbody)
+    xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
+    arm, weight, torque = np.empty(3), np.empty(3), np.empty(3)
+    out[:] = 0.0
+    for body in range(handle.first_body, handle.nbody):
+        link = min(body - handle.first_body, n)
+        for i in range(min(link + 1, n)):
+            for k in range(3):
+                arm[k] = com[body, k] - xanchor[i, k]
+                weight[k] = mass[body] * handle.gravity[k]
+            cross_into(arm, weight, torque)
+            out[i, link] -= dot(xaxis[i], torque)
 
 
 @compiled

@@ -1,0 +1,159 @@
+"""What acts on the arm, from joint measurements: the momentum observer, the weighing of the links, what is the tool's.
+
+Each function advances one part of a controller record by one tick.
+"""
+
+import math
+
+import numpy as np
+
+from contactsafe.compiled import compiled
+from contactsafe.control.laws import momentum, observer_step, weigh
+from contactsafe.control.records import FREE
+from contactsafe.robot.dynamics import mass_regressor
+from contactsafe.robot.friction import joint_friction
+from contactsafe.robot.linalg import dot, matvec, matvec_t
+
+LOST_AFTER_TICKS = 20
+"""Unusable measurements in a row after which nothing is known of the torque meanwhile."""
+
+_SIGMAS = 3.0
+"""A contact is what exceeds this many standard deviations of the weight that is not known yet."""
+
+_CORRELATED = 10.0
+"""Readings of one joint's residual, a few ms apart, err alike: so many of them count as one."""
+
+_NOISE_NM = 0.15
+_FORGET_S = 60.0
+_SETTLE_TICKS = 40
+
+
+@compiled
+def start(c):
+    """Begin at rest: momentum as measured, command at gravity, so that nothing jumps; the links weigh what is said."""
+    state, dynamics, params = c.state, c.dynamics, c.params
+    state.started = 1
+    state.task_share = 1.0
+    state.tank_j = params.tank_j
+    state.K_task[:] = state.target.K_task
+    state.D_task[:] = state.target.D_task
+    for j in range(state.mass_error.shape[0]):
+        state.mass_covariance[j, j] = params.mass_variance[j]
+    for i in range(state.gravity_sigma.shape[0]):
+        state.gravity_sigma[i] = _gravity_sigma(c, i)
+    state.momentum[:] = momentum(dynamics.M, c.measurement.qd)
+    for i in range(state.beta.shape[0]):
+        state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
+        # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
+        state.tau[i] = state.beta[i]
+
+
+@compiled
+def correct_gravity(c):
+    """Add what the links were found to weigh more than the model says to the model's gravity torque."""
+    if c.params.mass_uncertainty == 0.0:
+        return
+    mass_regressor(c.handle, c.dynamics.mass_regressor)
+    if c.measurement.has_wrench != 0:
+        c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
+    c.dynamics.g += matvec(c.dynamics.mass_regressor, c.state.mass_error)
+
+
+@compiled
+def observe(c):
+    """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14).
+
+    After unusable measurements it is the mean since the last good one, during which the torque was repeated.
+    """
+    state, dynamics, params = c.state, c.dynamics, c.params
+    n = state.tau.shape[0]
+    since = params.dt * (1 + state.bad_ticks)
+    known = state.bad_ticks <= LOST_AFTER_TICKS
+    p = momentum(dynamics.M, c.measurement.qd)
+    tau_external, rate = np.empty(n), np.empty(n)
+    for i in range(n):
+        beta = dynamics.g[i] - dynamics.CT_qd[i]
+        applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
+        rate[i] = (p[i] - state.momentum[i]) / since
+        tau_external[i] = rate[i] - applied
+        state.beta[i] = beta
+        state.momentum[i] = p[i]
+    if not known:
+        return
+    if c.measurement.has_wrench != 0 and params.cancel_tool_wrench != 0:
+        tau_tool = matvec_t(dynamics.J, c.measurement.wrench_ee)
+        for i in range(n):
+            tau_external[i] -= tau_tool[i]
+    observer_step(state.observed, params.observer_share, tau_external)
+    observer_step(state.observed_trigger, params.trigger_share, tau_external)
+    observer_step(state.observed_rate, params.trigger_share, rate)
+    observer_step(state.residual, params.lowpass_share, state.observed)
+    observer_step(state.residual_trigger, params.lowpass_share, state.observed_trigger)
+    observer_step(state.momentum_rate, params.lowpass_share, state.observed_rate)
+
+
+@compiled
+def part_tool_from_arm(c, J_bar):
+    """Split the residual into the tool's share and the arm's; fill `arm_torque`, `arm_torque_trigger` and `alarm`.
+
+    With a force sensor the tool's wrench is known and taken out already. Without one, a wrench at the tool never shows
+    in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact; and of the rest, the wrench that was there before
+    the contact stays the tool's. An arm without a null space cannot tell: there all of it counts as the arm's.
+    """
+    state, J = c.state, c.dynamics.J
+    n = state.tau.shape[0]
+    state.alarm[:] = state.residual_trigger
+    if c.measurement.has_wrench != 0 or c.params.cancel_tool_wrench == 0 or n <= 6:
+        state.arm_torque[:] = state.residual
+        state.arm_torque_trigger[:] = state.residual_trigger
+        return
+    wrench = matvec_t(J_bar, state.residual_trigger)
+    state.alarm -= matvec_t(J, wrench)
+    if state.mode == FREE:
+        observer_step(state.tool_wrench, c.params.tool_share, wrench)
+    tau_tool = matvec_t(J, state.tool_wrench)
+    state.arm_torque[:] = state.residual - tau_tool
+    state.arm_torque_trigger[:] = state.residual_trigger - tau_tool
+
+
+@compiled
+def set_thresholds(c):
+    """Give each joint the threshold that what is not known of the arm asks for.
+
+    δ plus a share of friction and of inertial torque, whose model is not exact, plus the standard deviation of the
+    gravity torque that is left after weighing.
+    """
+    state, params = c.state, c.params
+    friction = joint_friction(params.friction, c.measurement.qd)
+    for i in range(state.threshold.shape[0]):
+        unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * abs(
+            state.momentum_rate[i]
+        )
+        state.threshold[i] = params.residual_threshold + unknown + _SIGMAS * state.gravity_sigma[i]
+
+
+@compiled
+def weigh_links(c):
+    """Learn from one joint's residual what the links weigh, while nothing touches the arm; one joint a tick."""
+    state, params, dynamics = c.state, c.params, c.dynamics
+    if params.mass_uncertainty == 0.0:
+        return
+    n = state.tau.shape[0]
+    i = state.turn
+    state.turn = (i + 1) % n
+    row = dynamics.mass_regressor[i]
+    for j in range(row.shape[0]):
+        state.mass_covariance[j, j] += params.mass_variance[j] * n * params.dt / _FORGET_S
+    told = c.measurement.has_wrench != 0
+    state.ticks += 1
+    if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
+        error = _NOISE_NM + state.threshold[i] - params.residual_threshold - _SIGMAS * state.gravity_sigma[i]
+        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], _CORRELATED * error * error)
+    state.gravity_sigma[i] = _gravity_sigma(c, i)
+
+
+@compiled
+def _gravity_sigma(c, i):
+    """Standard deviation of what joint i's gravity torque differs from the model's, N m."""
+    row = c.dynamics.mass_regressor[i]
+    return math.sqrt(max(dot(row, matvec(c.state.mass_covariance, row)), 0.0))

@@ -1,0 +1,129 @@
+"""Which mode the controller is in, where it is touched, and whether something pushes the arm or is in its way."""
+
+import math
+
+import numpy as np
+
+from contactsafe.compiled import compiled
+from contactsafe.control.laws import is_pushed, observer_step
+from contactsafe.control.records import CONTACT, FREE
+from contactsafe.robot.contact import best_point, contact_lever, skin_torque
+from contactsafe.robot.linalg import dot
+
+_POINTS_A_TICK = 60
+"""Points of the skin that are searched for the contact in one tick."""
+
+_LEAST_LEVER = 0.03
+"""No contact counts as nearer to all axes than this, m: its force would be anybody's guess."""
+
+_LEVER_SHARE = 0.2
+"""Of a newly found lever arm that is taken over at once."""
+
+
+@compiled
+def _link_in_contact(alarm, threshold):
+    """Give the furthest joint from the base whose torque exceeds its threshold, 1 … n; 0 for none."""
+    for i in range(alarm.shape[0] - 1, -1, -1):
+        if abs(alarm[i]) > threshold[i]:
+            return i + 1
+    return 0
+
+
+@compiled
+def supervise(c):
+    """Choose the mode, with dwell and release; remember the contact's direction; tell pusher from obstacle."""
+    state, params = c.state, c.params
+    link = _link_in_contact(state.alarm, state.threshold)
+    state.mode_ticks += 1
+    state.quiet_ticks = 0 if link != 0 else state.quiet_ticks + 1
+    if state.mode == FREE:
+        if link != 0 and params.contact_aware != 0:
+            _enter(state, CONTACT)
+    elif state.mode_ticks >= params.dwell_ticks and state.quiet_ticks > params.release_ticks:
+        _enter(state, FREE)
+    if state.mode == CONTACT:
+        if link != 0:
+            state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
+            _locate(c, link)
+    _watch_push(c)
+    c.output.link = 0 if link == 0 else state.contact_link
+
+
+@compiled
+def _size(x):
+    return max(math.sqrt(dot(x, x)), 1e-9)
+
+
+@compiled
+def _locate(c, link):
+    """Look for the contact on the skin: all of it when it is found, later a part each tick.
+
+    Lever arms are smoothed: a contact between two links would be now on the one, now on the other.
+    """
+    state = c.state
+    first = state.contact_link == 0
+    points = c.handle.skin_points
+    if first:
+        _take_link(c, link, contact_lever(c.handle, link, state.direction), 1.0)
+    if state.search_at == 0:
+        state.search_point, state.search_fit = -1, 0.0
+    stop = points if first else min(state.search_at + _POINTS_A_TICK, points)
+    torque = np.empty(state.direction.shape[0])
+    state.search_point, state.search_fit = best_point(
+        c.handle, state.search_at, stop, state.direction, torque, state.search_point, state.search_fit
+    )
+    state.search_at = stop % points if points > 0 else 0
+    if state.search_at == 0 and state.search_point >= 0:
+        found = skin_torque(c.handle, state.search_point, torque)
+        _take_link(c, found, _size(torque), 1.0 if first else _LEVER_SHARE)
+
+
+@compiled
+def _take_link(c, link, lever, share):
+    state = c.state
+    most = max(lever, contact_lever(c.handle, link, state.direction))
+    state.contact_link = link
+    state.lever += share * (max(lever, _LEAST_LEVER) - state.lever)
+    state.lever_most += share * (max(most, _LEAST_LEVER) - state.lever_most)
+
+
+@compiled
+def _enter(state, mode):
+    state.mode, state.mode_ticks = mode, 0
+    state.moved_rad, state.moved_smooth_rad, state.torque_smooth_nm, state.reference_nm = 0.0, 0.0, 0.0, 0.0
+    state.contact_link, state.search_at = 0, 0
+    state.judge_rad, state.holding, state.hold_s, state.hold_nm, state.meet_n = math.inf, 0, 0.0, 0.0, math.inf
+
+
+@compiled
+def _watch_push(c):
+    """Tell what pushes the arm from what is in its way: give way a little, and see whether the torque falls.
+
+    Torque and velocity pass the same filters, or the torque's lag would look like a pusher.
+    """
+    state, params = c.state, c.params
+    observer_step(state.velocity_observed, params.trigger_share, c.measurement.qd)
+    observer_step(state.velocity_seen, params.lowpass_share, state.velocity_observed)
+    if state.mode != CONTACT:
+        return
+    lever = state.lever
+    state.meet_n = min(state.meet_n, params.push_meet_n) * (1.0 - params.dt / params.meet_s)
+    state.moved_rad += params.dt * dot(state.direction, state.velocity_seen)
+    torque = dot(state.direction, state.arm_torque_trigger)
+    state.torque_smooth_nm += params.probe_share * (torque - state.torque_smooth_nm)
+    state.moved_smooth_rad += params.probe_share * (state.moved_rad - state.moved_smooth_rad)
+    moved, torque = state.moved_smooth_rad, state.torque_smooth_nm
+    step = params.probe_m / lever
+    if moved <= 0.0:  # the arm moves into it
+        state.moved_rad, state.moved_smooth_rad, state.reference_nm = min(state.moved_rad, 0.0), 0.0, torque
+    state.judge_rad = min(state.judge_rad, moved + step)
+    if moved >= state.judge_rad:
+        state.judge_rad = moved + step
+        if is_pushed(state.reference_nm - torque, moved, lever, params.pusher_stiffness):
+            state.holding = 1
+            state.hold_s = max(2.0 * state.hold_s, params.hold_s)
+            state.hold_nm = params.hold_margin * torque
+        else:
+            state.holding, state.hold_s, state.hold_nm, state.meet_n = 0, 0.0, 0.0, 0.0
+    if state.holding != 0:
+        state.hold_nm *= 1.0 - params.dt / state.hold_s
