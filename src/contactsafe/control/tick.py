@@ -205,7 +205,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
     braked along the contact's direction; and the command never pushes along it harder than the bound in force: first
     the compensation gives way, then the pull of the task as a whole, last the damping.
     """
-    state, dynamics, params = c.state, c.dynamics, c.params
+    state, params = c.state, c.params
     qd, direction, M_inv = c.measurement.qd, c.state.direction, c.dynamics.M_inv
     limit = _push_limit(c)
     damping -= params.null_damping * matvec_t(removed, qd)
@@ -234,8 +234,9 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
 def _push_limit(c):
     """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
     params, state = c.params, c.state
-    limit = min(params.push_yield_nm, max(params.push_yield_n * state.lever, state.meet_n * state.lever_most))
-    return max(limit, min(state.hold_nm, params.push_hold_nm, params.push_hold_n * state.lever_most))
+    gentle = min(params.push_yield_nm, params.push_yield_n * state.lever)
+    firm = max(state.meet_n * state.lever_most, min(state.hold_nm, params.push_hold_n * state.lever_most))
+    return max(gentle, min(firm, params.push_hold_nm))
 
 
 @compiled
