@@ -58,7 +58,9 @@ class ControllerConfig:
         damping_range: allowed D_task, 1/s.
         joint_margin: distance from the joint limits at which the joint stops begin, rad.
         joint_stop_stiffness: N m/rad.
-        joint_stop_damping: N m s/rad.
+        joint_deceleration: a joint moves no faster than this can stop it before the margin, rad/s².
+        joint_brake: braking of a joint that is too fast, per excess of speed and inertia, 1/s.
+        joint_speed_fraction: share of the arm's joint speed limits that is used.
         manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
         manipulability_damping: λ² at a singularity.
         error_max_m: the tool is pulled as if x_d were no further away than this, m.
@@ -109,7 +111,9 @@ class ControllerConfig:
     damping_range: tuple[float, float] = (2.0, 120.0)
     joint_margin: float = 0.1
     joint_stop_stiffness: float = 200.0
-    joint_stop_damping: float = 30.0
+    joint_deceleration: float = 8.0
+    joint_brake: float = 50.0
+    joint_speed_fraction: float = 0.9
     manipulability_floor: float = 1e-2
     manipulability_damping: float = 0.05
     error_max_m: float = math.inf

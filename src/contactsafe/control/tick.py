@@ -244,14 +244,14 @@ def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     q, qd = c.measurement.q, c.measurement.qd
-    balance = dynamics.g + dynamics.c
-    tau -= balance
+    tau -= dynamics.g + dynamics.c
     joint_stop_torque(
-        tau, q, qd, params.q_min, params.q_max, params.joint_margin, params.joint_stop_stiffness,
-        params.joint_stop_damping,
+        tau, q, qd, dynamics.M, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
     )  # fmt: skip
+    tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
-    tau += balance
+    tau += dynamics.g
     friction = np.zeros(q.shape[0])
     if params.friction_compensation != 0:
         friction = joint_friction(params.friction, qd)
