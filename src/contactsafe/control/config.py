@@ -10,7 +10,8 @@ from contactsafe.errors import InvalidInputError
 _PER_JOINT = ("K_pose", "D_pose")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
-    "push_yield_n", "push_hold_n", "push_tool_n", "error_max_m", "error_max_rad", "tank_j",
+    "push_yield_n", "push_hold_n", "push_tool_n", "pull_max_m_s2", "pull_max_rad_s2",
+    "posture_error_max_rad", "tank_j",
 )  # fmt: skip
 
 
@@ -63,8 +64,9 @@ class ControllerConfig:
         joint_speed_fraction: share of the arm's joint speed limits that is used.
         manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
         manipulability_damping: λ² at a singularity.
-        error_max_m: the tool is pulled as if x_d were no further away than this, m.
-        error_max_rad: nor turned away further, rad.
+        pull_max_m_s2: largest acceleration K e that pulls the tool to its target, m/s².
+        pull_max_rad_s2: the same of its turning, rad/s².
+        posture_error_max_rad: the posture is pulled as if it were no further away than this, rad.
         passive_gains: raise stiffness and damping no faster than keeps the impedance stable whatever is asked.
         tank_j: energy that the command may give at once, J; inf for no bound.
         tank_power_w: power that it may give for ever, W.
@@ -116,8 +118,9 @@ class ControllerConfig:
     joint_speed_fraction: float = 0.9
     manipulability_floor: float = 1e-2
     manipulability_damping: float = 0.05
-    error_max_m: float = math.inf
-    error_max_rad: float = math.inf
+    pull_max_m_s2: float = math.inf
+    pull_max_rad_s2: float = math.inf
+    posture_error_max_rad: float = math.inf
     passive_gains: bool = False
     tank_j: float = math.inf
     tank_power_w: float = 0.0

@@ -60,15 +60,29 @@ def _determinant(A):
 
 
 @compiled
-def stiffness_wrench(Lambda, error, K_task):
-    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m.
+def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
+    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
 
     Args:
         Lambda: task inertia, (6, 6).
         error: x_d − x, position then rotation vector, (6,), m and rad.
         K_task: stiffness per unit task inertia, (6,), 1/s².
+        linear_max: bound on the acceleration asked for, m/s².
+        angular_max: rad/s².
     """
-    return matvec(Lambda, K_task * error)
+    acceleration = K_task * error
+    shorten(acceleration[:3], linear_max)
+    shorten(acceleration[3:], angular_max)
+    return matvec(Lambda, acceleration)
+
+
+@compiled
+def shorten(x, length_max):
+    """Scale a vector in place to a largest length."""
+    length = math.sqrt(dot(x, x))
+    if length > length_max:
+        for i in range(x.shape[0]):
+            x[i] *= length_max / length
 
 
 @compiled
@@ -231,16 +245,6 @@ def weigh(mass_error, covariance, row, torque, variance):
         mass_error[i] += P_row[i] * share * torque
         for j in range(row.shape[0]):
             covariance[i, j] -= P_row[i] * share * P_row[j]
-
-
-@compiled
-def clip_error(error, length_max, angle_max):
-    """Shorten a pose error in place to a largest distance and a largest angle; (6,), m and rad."""
-    for first, most in ((0, length_max), (3, angle_max)):
-        size = math.sqrt(dot(error[first : first + 3], error[first : first + 3]))
-        if size > most:
-            for i in range(first, first + 3):
-                error[i] *= most / size
 
 
 @compiled

@@ -15,7 +15,6 @@ from contactsafe.control.estimate import (
     weigh_links,
 )
 from contactsafe.control.laws import (
-    clip_error,
     contact_nullspace,
     damping_wrench,
     joint_stop_torque,
@@ -23,6 +22,7 @@ from contactsafe.control.laws import (
     passive_step,
     power_limit,
     push_along,
+    shorten,
     stiffness_wrench,
     task_error,
     task_inertia,
@@ -162,12 +162,13 @@ def _law(c, Lambda, J_bar):
     )
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     c.output.error[:] = error
-    clip_error(error, params.error_max_m, params.error_max_rad)
-    F_spring = stiffness_wrench(Lambda, error, state.K_task)
+    F_spring = stiffness_wrench(Lambda, error, state.K_task, params.pull_max_m_s2, params.pull_max_rad_s2)
+    q_error = target.q_pose - q
+    shorten(q_error, params.posture_error_max_rad)
     F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, state.D_task)
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * (target.q_pose - q))
+    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * q_error)
     damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
     share = tool_share(F_spring, _tool_force(c, J_bar), params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
