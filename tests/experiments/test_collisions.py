@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from contactsafe import presets
+from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import LINKS, draw_motion
 from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
 from contactsafe.experiments.config import ExperimentConfig
@@ -68,6 +69,19 @@ def test_what_replays_a_trial_is_a_command_for_presets_and_python_for_others(bat
     own = {"vices": presets.vices(), "softer": replace(presets.safe(), push_yield_n=8.0)}
     (row,) = run_battery(own, [3], ["clean"]).tables[1].as_records()
     assert row["replay"] == "run_battery(controllers, [3])"
+
+
+@pytest.mark.parametrize("case", [({}, [0], ["real"]), (TWO, [], ["real"]), (TWO, [0], []), (TWO, [0], ["wet"])])
+def test_a_battery_of_nothing_is_refused(case):
+    with pytest.raises(InvalidInputError, match="give one or more of each, plants from real, clean"):
+        run_battery(*case)
+
+
+def test_seeds_of_several_batches_come_in_order(monkeypatch):
+    monkeypatch.setattr("contactsafe.experiments.collisions.BATCH", 2)
+    result = run_battery({"safe": presets.safe()}, range(5), ["clean"])
+    assert [trial.seed for trial in result.trials] == [0, 1, 2, 3, 4]
+    assert [recording.seed for recording in result.recordings] == [0]
 
 
 def test_progress_adds_up_to_what_was_announced():

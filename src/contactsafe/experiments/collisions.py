@@ -1,13 +1,16 @@
 """Collisions nobody chose: random motions meet random obstacles anywhere along the arm; how hard, and how long?"""
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
+from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import Meeting, Motion, draw_meetings, draw_motion
-from contactsafe.experiments.config import PLANTS, ExperimentConfig
+from contactsafe.experiments.config import BATCH, PLANTS, ExperimentConfig
 from contactsafe.experiments.motions import record
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress
@@ -20,9 +23,6 @@ QUESTION = (
     "The tool sweeps or holds, wiping or in free air, and a random point of the arm meets something soft or stiff: "
     "how hard is the contact, and for how long?"
 )
-BATCH = 50
-"""Most trials stepped together: bounds the memory that their traces take, some 5 MB a trial."""
-
 STEADY_S = 0.5
 """The last part of a trial, over which steady figures are means, s."""
 
@@ -61,21 +61,53 @@ def run_battery(
 
     Returns:
         A trial for each seed, plant and controller, recordings of the first seed, tables of verdicts and worst trials.
+
+    Raises:
+        InvalidInputError: no controller, no seed, or a plant that is not one of `PLANTS`.
     """
+    if not controllers or not seeds or not plants or not set(plants) <= set(PLANTS):
+        raise InvalidInputError(
+            f"{len(controllers)} controllers, {len(seeds)} seeds, plants {', '.join(plants)}; "
+            f"give one or more of each, plants from {', '.join(PLANTS)}"
+        )
     arm = robots.panda()
+    batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
+    # Each batch steps in native threads; several at a time, so that one steps while another is being set up.
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        done = list(
+            pool.map(
+                lambda batch: _run_batch(arm, batch, controllers, plants, progress, recorded=batch is batches[0]),
+                batches,
+            )
+        )
+    finally:
+        pool.shutdown(cancel_futures=True)
+    trials = tuple(trial for of_batch, _ in done for trial in of_batch)
+    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers)))
+    return Experiment("collisions", QUESTION, trials, tuple(done[0][1]), tables)
+
+
+def _run_batch(
+    arm: Arm,
+    seeds: Sequence[int],
+    controllers: Mapping[str, ControllerConfig],
+    plants: Sequence[str],
+    progress: Progress | None,
+    recorded: bool,
+) -> tuple[list[Trial], list[Recording]]:
+    """Give the trials of some seeds, and recordings of the first of them where wanted."""
+    batch = _Batch(arm, seeds)
     trials: list[Trial] = []
     recordings: list[Recording] = []
-    for start in range(0, len(seeds), BATCH):
-        batch = _Batch(arm, seeds[start : start + BATCH])
-        for plant in plants:
-            for name, traces in batch.run(controllers, plant):
-                trials += batch.trials(name, plant, traces)
-                if start == 0:
-                    recordings.append(batch.recording(name, plant, traces))
-                if progress:
-                    progress(len(traces))
-    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers)))
-    return Experiment("collisions", QUESTION, tuple(trials), tuple(recordings), tables)
+    for plant in plants:
+        for name, traces in batch.run(controllers, plant):
+            trials += batch.trials(name, plant, traces)
+            if recorded:
+                recordings.append(batch.recording(name, plant, traces))
+            if progress:
+                progress(len(traces))
+    return trials, recordings
 
 
 def _replay(controllers: Mapping[str, ControllerConfig]) -> str:
