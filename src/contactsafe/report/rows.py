@@ -37,7 +37,7 @@ class Aim:
         elif self.above is not None:
             parts.append(f"over {self.above:g} {unit}")
         elif self.below == 0:
-            parts.append("none")
+            parts.append("always 0")
         elif self.below is not None:
             parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
         if self.share is not None:
