@@ -56,7 +56,7 @@ def safe() -> ControllerConfig:
         probe_m=0.001,
         push_tool_n=20.0,
         hold_recover_s=0.03,
-        joint_margin=0.15,
+        joint_margin=0.2,
         joint_speed_fraction=0.6,
         pull_max_m_s2=15.0,
         pull_max_rad_s2=80.0,

@@ -1,5 +1,7 @@
 """A hostile policy: random, extreme, jumping and unusable targets; does the arm keep every limit it promises?"""
 
+from dataclasses import replace
+
 import numpy as np
 
 from contactsafe.control import presets
@@ -74,8 +76,6 @@ def _world(arm: Arm, rng: np.random.Generator) -> WorldConfig:
 
 def _thing(rng: np.random.Generator) -> Obstacle:
     """Draw something in the arm's reach, clear of where it stands at first."""
-    from dataclasses import replace
-
     angle, distance = rng.uniform(0.5, 2 * np.pi - 0.5), rng.uniform(0.35, 0.6)
     position = (float(distance * np.cos(angle)), float(distance * np.sin(angle)), float(rng.uniform(0.2, 0.8)))
     return replace(draw_thing(rng, rng.uniform(0.03, 0.08), may_be_fixed=True), position=position)
