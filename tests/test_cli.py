@@ -1,5 +1,6 @@
 """The command line: help that teaches, exit status that can be trusted, one line for a user's mistake."""
 
+import csv
 import importlib.util
 import json
 import shutil
@@ -89,7 +90,8 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
     [
         (
             "experiment dancing",
-            "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance",
+            "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, "
+            "detection",
         ),
         (
             "experiment disturbance --controllers safe,best",
@@ -97,6 +99,8 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         ),
         ("experiment disturbance --controllers ,", "no controller given; choose from vices, paper, safe"),
         ("experiment disturbance --trials 0", "trials = 0; give 1 or more"),
+        ("experiment collisions --plants wet", "plants = wet; choose from real, clean"),
+        ("experiment detection --controllers vices", "none of vices reports contacts; choose paper or safe"),
         ("demo --seed -1", "seed = -1; give 0 or more"),
         ("demo --controllers best", "controller 'best' is unknown; choose from vices, paper, safe"),
         ("evaluate --controller best", "controller 'best' is unknown; choose from vices, paper, safe"),
@@ -172,6 +176,43 @@ def test_json_of_an_experiment_is_all_that_is_on_stdout(bundle, capsys):
     assert {trial["seed"] for trial in experiment["trials"]} == {4}
     assert {trial["controller"] for trial in experiment["trials"]} == {"vices", "safe"}
     assert "disturbance" in err  # the progress bar
+
+
+def test_collisions_need_no_bundle_and_leave_page_summary_and_a_row_a_trial(tmp_path, capsys, monkeypatch):
+    def load(*_):
+        pytest.fail("a bundle was asked for")
+
+    monkeypatch.setattr("contactsafe.cli.Bundle.load", load)
+    words = "experiment collisions --trials 2 --controllers vices,safe --seed 4 --out"
+    assert main([*words.split(), str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert "trials harder than vices" in out
+    assert "--trials 1 --out trial-4 --seed 4" in out
+    assert "4/4" not in err
+    assert "8/8" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["collisions.csv", "report.html", "summary.json"]
+    with open(tmp_path / "collisions.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    cases = [(row["seed"], row["plant"], row["controller"]) for row in rows]
+    assert sorted(cases) == sorted(
+        (seed, plant, name) for seed in "45" for plant in ("real", "clean") for name in ("vices", "safe")
+    )
+    summary = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
+    trial = summary["experiments"]["collisions"]["trials"][0]
+    row = next(
+        r for r in rows if (r["seed"], r["plant"], r["controller"]) == ("4", trial["plant"], trial["controller"])
+    )
+    assert float(row["contact_peak_n"]) == pytest.approx(trial["metrics"]["contact_peak_n"], rel=1e-5)
+
+
+def test_json_of_collisions_has_the_verdict(capsys):
+    words = "experiment collisions --trials 1 --controllers vices,safe --plants clean --json"
+    assert main(words.split()) == 0
+    summary = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert summary["command"].endswith("--trials 1 --seed 0 --controllers vices,safe --plants clean")
+    assert "bundle_sha256" not in summary
+    verdict = {row["figure"]: row for row in summary["experiments"]["collisions"]["tables"]["verdict"]}
+    assert verdict["trials compared"]["safe, clean"] == 1
 
 
 def test_evaluate_says_how_the_policy_did(bundle, capsys):

@@ -20,45 +20,34 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.learning.bundle import MANIFEST, Bundle, digest, shipped_bundle
 
-Controllers = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
-
-
-def _experiments() -> dict[str, Callable]:
-    from contactsafe.experiments.disturbance import disturbance
-    from contactsafe.experiments.joint_safety import joint_safety
-    from contactsafe.experiments.task_safety import task_safety
-
-    return {"task-safety": task_safety, "joint-safety": joint_safety, "disturbance": disturbance}
-
-
-_SCENARIOS = {"task-safety": 1, "joint-safety": 2, "disturbance": 6}
+Names = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
 
 
 def demo(
     out: Path = Path("contactsafe-demo"),
     trials: int = 10,
     seed: int = 0,
-    controllers: Controllers = "vices,paper,safe",
+    controllers: Names = "vices,paper,safe",
     bundle: Path | None = None,
 ) -> None:
     """Run the shipped policy through the paper's three experiments and write a page about it.
 
     Args:
-        out: folder for report.html and summary.json.
+        out: folder for report.html, summary.json and the trials as CSV.
         trials: seeds tried with each controller.
         seed: first seed.
         controllers: presets to compare.
         bundle: folder of another policy.
     """
+    from contactsafe.experiments import registry
     from contactsafe.report import prepare_output, terminal_table, write_report
 
-    config = _config(controllers, trials, seed)
+    config = ExperimentConfig(_split(controllers), trials, seed)
     loaded = Bundle.load(bundle or shipped_bundle())
     folder = prepare_output(out)
     started = time.monotonic()
-    names = list(_SCENARIOS)
     print("contactsafe demo: compiling on the first run takes about a minute", file=sys.stderr)
-    results = _run(names, loaded, config)
+    results = _run(registry.PAPER, loaded, config)
     facts = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
     page = write_report(folder, results, facts)
     print(terminal_table(results))
@@ -67,31 +56,50 @@ def demo(
 
 def experiment(
     name: Annotated[str, tyro.conf.Positional],
-    controllers: Controllers = "vices,paper,safe",
-    trials: int = 10,
+    controllers: Names = "vices,paper,safe",
+    trials: int | None = None,
     seed: int = 0,
+    plants: Names = "real,clean",
+    minutes: float = 60.0,
     out: Path | None = None,
     json: bool = False,
     bundle: Path | None = None,
 ) -> None:
-    """Run one experiment: task-safety, joint-safety or disturbance.
+    """Run one experiment: task-safety, joint-safety, disturbance, collisions or detection.
+
+    task-safety   the policy wipes boards it has never seen: how hard does the tool press?
+
+    joint-safety  something unknown draws the policy aside, and the forearm runs into an obstacle.
+
+    disturbance   somebody leans on the arm with 25 N.
+
+    collisions    random motions meet random obstacles with a random point of the arm: a battery.
+
+    detection     how soon is a contact reported, is its link named rightly, how often is one reported that is none?
+
+    The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
+    of any batch once more and draws it.
 
     Args:
-        name: task-safety, joint-safety or disturbance.
+        name: task-safety, joint-safety, disturbance, collisions or detection.
         controllers: presets to compare.
-        trials: seeds tried with each controller.
+        trials: seeds tried with each controller; 10, and 100 for collisions and detection, where nothing is said.
         seed: first seed.
-        out: folder for report.html and summary.json; none is written without it.
-        json: print spreads and trials as JSON instead of a table.
+        plants: collisions with an arm and sensors that have errors (real), without any (clean), or both side by side.
+        minutes: simulated time in which detection counts false alarms.
+        out: folder for report.html, summary.json and the trials as NAME.csv; none is written without it.
+        json: print tables, spreads and trials as JSON instead of text.
         bundle: folder of another policy.
     """
+    from contactsafe.experiments import registry
     from contactsafe.report import prepare_output, terminal_table, write_report
     from contactsafe.report.summary import summarise
 
-    if name not in _SCENARIOS:
-        raise InvalidInputError(f"experiment '{name}' is unknown; choose from {', '.join(_SCENARIOS)}")
-    config = _config(controllers, trials, seed)
-    loaded = Bundle.load(bundle or shipped_bundle())
+    entry = registry.by_name(name)
+    config = ExperimentConfig(
+        _split(controllers), entry.trials if trials is None else trials, seed, _split(plants), minutes
+    )
+    loaded = Bundle.load(bundle or shipped_bundle()) if bundle or entry.needs_policy else None
     folder = prepare_output(out) if out else None
     started = time.monotonic()
     results = _run([name], loaded, config)
@@ -227,34 +235,40 @@ COMMANDS = {
 }
 
 
-def _config(controllers: str, trials: int, seed: int) -> ExperimentConfig:
-    names = tuple(name.strip() for name in controllers.split(",") if name.strip())
-    return ExperimentConfig(names, trials, seed)
+def _split(names: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
-def _run(names: Sequence[str], bundle: Bundle, config: ExperimentConfig) -> list[Experiment]:
-    experiments = _experiments()
+def _run(names: Sequence[str], bundle: Bundle | None, config: ExperimentConfig) -> list[Experiment]:
+    from contactsafe.experiments import registry
+
+    entries = {name: registry.by_name(name) for name in names}
     results = []
-    total = config.trials * len(config.controllers) * sum(_SCENARIOS[name] for name in names)
-    with tqdm(total=total, unit="trial", file=sys.stderr) as bar:
-        for name in names:
+    with tqdm(total=sum(entry.count(config) for entry in entries.values()), unit="trial", file=sys.stderr) as bar:
+        for name, entry in entries.items():
             bar.set_description(name)
-            results.append(experiments[name](bundle, config, bar.update))
+            results.append(entry.run(bundle, config, bar.update))
     return results
 
 
-def _facts(command: str, config: ExperimentConfig, bundle: Bundle, seconds: float) -> dict:
+def _facts(command: str, config: ExperimentConfig, bundle: Bundle | None, seconds: float) -> dict:
     from contactsafe.experiments.disturbance import PUSH_S
 
-    names = ",".join(config.controllers)
-    return {
-        "command": f"{command} --trials {config.trials} --seed {config.seed} --controllers {names}",
+    words = [command, f"--trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}"]
+    if config.plants != ExperimentConfig.plants:
+        words.append(f"--plants {','.join(config.plants)}")
+    if config.minutes != ExperimentConfig.minutes:
+        words.append(f"--minutes {config.minutes:g}")
+    facts = {
+        "command": " ".join(words),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "seeds": list(range(config.seed, config.seed + config.trials)),
-        "bundle_sha256": digest((Path(bundle.folder) / MANIFEST).read_bytes()),
+        "seeds": list(config.seeds),
         "push_s": PUSH_S,
         "seconds": round(seconds, 1),
     }
+    if bundle is not None:
+        facts["bundle_sha256"] = digest((Path(bundle.folder) / MANIFEST).read_bytes())
+    return facts
 
 
 def _help() -> str:

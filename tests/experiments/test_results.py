@@ -8,7 +8,7 @@ import pytest
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.config import BATCH, ExperimentConfig
-from contactsafe.experiments.results import Experiment, Trial, spread, to_json
+from contactsafe.experiments.results import Experiment, Table, Trial, spread, to_json
 
 NAN = float("nan")
 
@@ -45,6 +45,21 @@ def test_spreads_gather_by_scenario_controller_and_metric():
     assert spreads["bottle"]["safe"]["time_s"].n == 0
 
 
+def test_plants_are_gathered_apart():
+    trials = tuple(
+        Trial("hold", "safe", 0, {"force_n": force}, plant) for plant, force in (("real", 2.0), ("clean", 1.0))
+    )
+    spreads = Experiment("collisions", "How hard?", trials).spreads()
+    assert list(spreads) == ["hold, real plant", "hold, clean plant"]
+    assert spreads["hold, clean plant"]["safe"]["force_n"].median == 1.0
+
+
+def test_tables_are_records_in_json():
+    table = Table("worst", "The worst", ("seed", "peak (N)"), ((3, 4.5), (7, NAN)), "Look at them.")
+    written = Experiment("collisions", "How hard?", (), (), (table,)).as_dict()
+    assert written["tables"] == {"worst": [{"seed": 3, "peak (N)": 4.5}, {"seed": 7, "peak (N)": None}]}
+
+
 def test_json_is_strict_and_says_null_where_nothing_is():
     text = to_json(experiment().as_dict())
     assert not {"NaN", "Infinity"} & set(text.replace(",", " ").split())
@@ -53,7 +68,8 @@ def test_json_is_strict_and_says_null_where_nothing_is():
         "median": None, "mean": None, "p5": None, "p95": None, "min": None, "max": None, "n": 0,
     }  # fmt: skip
     assert read["trials"][4] == {
-        "scenario": "bottle", "controller": "safe", "seed": 1, "metrics": {"force_n": None, "time_s": None},
+        "scenario": "bottle", "controller": "safe", "seed": 1, "plant": "",
+        "metrics": {"force_n": None, "time_s": None},
     }  # fmt: skip
 
 
@@ -72,6 +88,9 @@ def test_evaluation_of_a_policy_that_cleaned_nothing_is_still_json():
         ({"controllers": ()}, "no controller given; choose from vices, paper, safe"),
         ({"trials": 0}, "trials = 0; give 1 or more"),
         ({"seed": -1}, "seed = -1; give 0 or more"),
+        ({"plants": ("real", "wet")}, "plants = real,wet; choose from real, clean"),
+        ({"plants": ()}, "plants = ; choose from real, clean"),
+        ({"minutes": 0.0}, "minutes = 0; give a number greater than 0"),
     ],
 )
 def test_experiments_that_cannot_be_run_are_refused(fields, text):

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from contactsafe.experiments.results import Experiment, Trial
+from contactsafe.experiments.results import Experiment, Table, Trial
 from contactsafe.report import write_report
 from contactsafe.report.film import FORCE_UNIT, Q_UNIT
 
@@ -175,6 +175,27 @@ def test_one_controller_and_no_recordings(fakes, tmp_path):
     assert Page(page).faults == []
     assert "one controller" in page
     assert "data-film=" not in page.split("<script>")[1]
+
+
+def test_own_tables_and_the_trial_over_time_are_shown(fakes, tmp_path):
+    recordings = tuple(
+        fakes.record("sweep, real plant", name, 3.0, ((0.3, -0.2, 0.4), 2e3)) for name in ("vices", "safe")
+    )
+    table = Table("worst", "The <worst>", ("seed", "replay"), ((17, "again --seed 17"),), "Look.")
+    found = Experiment("collisions", "How hard?", fakes.task_safety().trials, recordings, (table,))
+    page = write_report(tmp_path, [found], {}).read_text(encoding="utf-8")
+    assert Page(page).faults == []
+    assert "The &lt;worst&gt;" in page
+    assert "again --seed 17" in page
+    for label in ("contact force (N)", "mode: 0 free", "tool away from its free motion (mm)"):
+        assert label in page
+    assert (tmp_path / "collisions.csv").exists()
+
+
+def test_a_policy_is_named_only_where_one_was_run(fakes, tmp_path, page):
+    assert "One learned policy, three controllers" in page
+    other = write_report(tmp_path, [fakes.disturbance()], {}).read_text(encoding="utf-8")
+    assert "learned policy" not in other[: other.index("<main>")].lower()
 
 
 def test_nothing_measured(tmp_path):

@@ -8,8 +8,10 @@ import pytest
 
 import contactsafe
 from contactsafe.errors import OutputError
+from contactsafe.experiments.results import Experiment, Table, Trial
 from contactsafe.report import prepare_output, terminal_table, write_report, write_summary
 from contactsafe.report.output import write_whole
+from contactsafe.report.summary import trials_csv
 
 
 def strict(text):
@@ -108,3 +110,29 @@ def test_terminal_table_aligns(experiments):
 
 def test_terminal_table_of_nothing():
     assert "median" in terminal_table([])
+
+
+def test_csv_has_a_row_a_trial_and_is_empty_where_nothing_is():
+    trials = (
+        Trial("hold, pushed", "safe", 3, {"peak_n": 0.1 + 0.2, "detect_ms": float("nan")}, "real"),
+        Trial("sweep", "vices", 3, {"peak_n": 2.0, "only_n": 1.0}),
+    )
+    assert trials_csv(Experiment("collisions", "?", trials)).splitlines() == [
+        "seed,scenario,controller,plant,peak_n,detect_ms,only_n",
+        '3,"hold, pushed",safe,real,0.30000000000000004,,',
+        "3,sweep,vices,,2.0,,1.0",
+    ]
+
+
+def test_own_tables_follow_in_the_terminal():
+    table = Table(
+        "worst", "The worst – of all", ("seed", "words", "peak (N)"), ((3, "so", 4.5), (12, "what", float("nan")))
+    )
+    text = terminal_table([Experiment("collisions", "?", (), (), (table,))])
+    assert text.isascii()
+    assert text.split("\n\n")[1].splitlines() == [
+        "The worst - of all",
+        "  seed  words  peak (N)",
+        "  3     so         4.50",
+        "  12    what          -",
+    ]

@@ -10,7 +10,8 @@ from contactsafe.errors import InvalidInputError
 _PER_JOINT = ("K_pose", "D_pose")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
-    "push_yield_n", "push_hold_n", "push_tool_n", "error_max_m", "error_max_rad", "tank_j",
+    "push_yield_n", "push_hold_n", "push_tool_n", "pull_max_m_s2", "pull_max_rad_s2",
+    "posture_error_max_rad", "tank_j",
 )  # fmt: skip
 
 
@@ -58,11 +59,14 @@ class ControllerConfig:
         damping_range: allowed D_task, 1/s.
         joint_margin: distance from the joint limits at which the joint stops begin, rad.
         joint_stop_stiffness: N m/rad.
-        joint_stop_damping: N m s/rad.
+        joint_deceleration: a joint moves no faster than this can stop it before the margin, rad/s².
+        joint_brake: braking of a joint that is too fast, per excess of speed and inertia, 1/s.
+        joint_speed_fraction: share of the arm's joint speed limits that is used.
         manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
         manipulability_damping: λ² at a singularity.
-        error_max_m: the tool is pulled as if x_d were no further away than this, m.
-        error_max_rad: nor turned away further, rad.
+        pull_max_m_s2: largest acceleration K e that pulls the tool to its target, m/s².
+        pull_max_rad_s2: the same of its turning, rad/s².
+        posture_error_max_rad: the posture is pulled as if it were no further away than this, rad.
         passive_gains: raise stiffness and damping no faster than keeps the impedance stable whatever is asked.
         tank_j: energy that the command may give at once, J; inf for no bound.
         tank_power_w: power that it may give for ever, W.
@@ -109,11 +113,14 @@ class ControllerConfig:
     damping_range: tuple[float, float] = (2.0, 120.0)
     joint_margin: float = 0.1
     joint_stop_stiffness: float = 200.0
-    joint_stop_damping: float = 30.0
+    joint_deceleration: float = 8.0
+    joint_brake: float = 50.0
+    joint_speed_fraction: float = 0.9
     manipulability_floor: float = 1e-2
     manipulability_damping: float = 0.05
-    error_max_m: float = math.inf
-    error_max_rad: float = math.inf
+    pull_max_m_s2: float = math.inf
+    pull_max_rad_s2: float = math.inf
+    posture_error_max_rad: float = math.inf
     passive_gains: bool = False
     tank_j: float = math.inf
     tank_power_w: float = 0.0

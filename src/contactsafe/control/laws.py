@@ -60,15 +60,29 @@ def _determinant(A):
 
 
 @compiled
-def stiffness_wrench(Lambda, error, K_task):
-    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m.
+def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
+    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
 
     Args:
         Lambda: task inertia, (6, 6).
         error: x_d − x, position then rotation vector, (6,), m and rad.
         K_task: stiffness per unit task inertia, (6,), 1/s².
+        linear_max: bound on the acceleration asked for, m/s².
+        angular_max: rad/s².
     """
-    return matvec(Lambda, K_task * error)
+    acceleration = K_task * error
+    shorten(acceleration[:3], linear_max)
+    shorten(acceleration[3:], angular_max)
+    return matvec(Lambda, acceleration)
+
+
+@compiled
+def shorten(x, length_max):
+    """Scale a vector in place to a largest length."""
+    length = math.sqrt(dot(x, x))
+    if length > length_max:
+        for i in range(x.shape[0]):
+            x[i] *= length_max / length
 
 
 @compiled
@@ -234,16 +248,6 @@ def weigh(mass_error, covariance, row, torque, variance):
 
 
 @compiled
-def clip_error(error, length_max, angle_max):
-    """Shorten a pose error in place to a largest distance and a largest angle; (6,), m and rad."""
-    for first, most in ((0, length_max), (3, angle_max)):
-        size = math.sqrt(dot(error[first : first + 3], error[first : first + 3]))
-        if size > most:
-            for i in range(first, first + 3):
-                error[i] *= most / size
-
-
-@compiled
 def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
@@ -288,30 +292,40 @@ def power_limit(tau_net, qd, tank, power, drain_s):
 
 
 @compiled
-def joint_stop_torque(tau_net, q, qd, q_min, q_max, margin, stiffness, damping):
-    """Keep joints in their range, in place: within a margin of it, what pushes outwards fades and a spring pushes back.
+def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness, deceleration, gain):
+    """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
-    A damper acts on motion towards the limit, rising over the margin, so that the stop is reached slowly. It never
-    pulls a joint towards its limit, and away from the limits changes nothing.
+    A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit.
+    What is faster is braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a
+    spring pushes back.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
         q, qd: (n,), rad and rad/s.
+        M: joint inertia, (n, n), kg m².
         q_min, q_max: range, (n,), rad.
+        qd_max: speed limits, (n,), rad/s.
         margin: rad.
         stiffness: N m/rad of intrusion.
-        damping: N m s/rad.
+        deceleration: a, rad/s².
+        gain: braking per excess of speed, 1/s.
     """
     for i in range(q.shape[0]):
-        low, high = (q_min[i] + margin - q[i]) / margin, (q[i] - q_max[i] + margin) / margin
-        inward, depth = (1.0, low) if low > high else (-1.0, high)
-        if depth <= 0.0:
-            continue
-        outward = max(-inward * tau_net[i], 0.0)
-        closing = max(-inward * qd[i], 0.0)
-        tau_net[i] += inward * (
-            min(depth, 1.0) * (outward + damping * closing) + stiffness * margin * depth * max(depth, 1.0)
-        )
+        way = 1.0 if qd[i] > 0.0 else -1.0
+        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin
+        excess = way * qd[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
+        if excess > 0.0:
+            on = max(way * tau_net[i], 0.0) * min(excess / _FADE_RAD_S, 1.0)
+            tau_net[i] -= way * (on + gain * M[i, i] * excess)
+        low, high = q_min[i] + margin - q[i], q[i] - q_max[i] + margin
+        if low > 0.0:
+            tau_net[i] = max(tau_net[i], -max(1.0 - low / margin, 0.0) * abs(tau_net[i])) + stiffness * low
+        elif high > 0.0:
+            tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - stiffness * high
+
+
+_FADE_RAD_S = 0.1
+"""Excess of speed at which nothing pushes a joint on any more, rad/s."""
 
 
 @compiled

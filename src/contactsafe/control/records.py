@@ -80,7 +80,7 @@ def params_dtype(n: int) -> np.dtype:
         + [(name, _f) for name in ("stiffness_min", "stiffness_max", "damping_min", "damping_max", "torque_step")]
         + [(name, _f) for name in _SHARES]
         + [("dwell_ticks", _i), ("release_ticks", _i)]
-        + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "tau_max")]
+        + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "qd_max", "tau_max")]
         + [("friction", _f, (n, 3)), ("mass_variance", _f, (n + 1,))]
     )
 
@@ -201,6 +201,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
     params["D_pose"] = _per_joint(config.D_pose, arm.n)
     params["q_min"], params["q_max"] = arm.q_min, arm.q_max
+    params["qd_max"] = config.joint_speed_fraction * arm.qd_max
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
 
 

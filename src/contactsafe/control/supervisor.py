@@ -41,10 +41,9 @@ def supervise(c):
             _enter(state, CONTACT)
     elif state.mode_ticks >= params.dwell_ticks and state.quiet_ticks > params.release_ticks:
         _enter(state, FREE)
-    if state.mode == CONTACT:
-        if link != 0:
-            state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
-            _locate(c, link)
+    if state.mode == CONTACT and link != 0:
+        state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
+        _locate(c, link)
     _watch_push(c)
     c.output.link = 0 if link == 0 else state.contact_link
 

@@ -15,7 +15,6 @@ from contactsafe.control.estimate import (
     weigh_links,
 )
 from contactsafe.control.laws import (
-    clip_error,
     contact_nullspace,
     damping_wrench,
     joint_stop_torque,
@@ -23,6 +22,7 @@ from contactsafe.control.laws import (
     passive_step,
     power_limit,
     push_along,
+    shorten,
     stiffness_wrench,
     task_error,
     task_inertia,
@@ -162,12 +162,13 @@ def _law(c, Lambda, J_bar):
     )
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     c.output.error[:] = error
-    clip_error(error, params.error_max_m, params.error_max_rad)
-    F_spring = stiffness_wrench(Lambda, error, state.K_task)
+    F_spring = stiffness_wrench(Lambda, error, state.K_task, params.pull_max_m_s2, params.pull_max_rad_s2)
+    q_error = target.q_pose - q
+    shorten(q_error, params.posture_error_max_rad)
     F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, state.D_task)
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * (target.q_pose - q))
+    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * q_error)
     damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
     share = tool_share(F_spring, _tool_force(c, J_bar), params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
@@ -205,7 +206,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
     braked along the contact's direction; and the command never pushes along it harder than the bound in force: first
     the compensation gives way, then the pull of the task as a whole, last the damping.
     """
-    state, dynamics, params = c.state, c.dynamics, c.params
+    state, params = c.state, c.params
     qd, direction, M_inv = c.measurement.qd, c.state.direction, c.dynamics.M_inv
     limit = _push_limit(c)
     damping -= params.null_damping * matvec_t(removed, qd)
@@ -234,8 +235,9 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
 def _push_limit(c):
     """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
     params, state = c.params, c.state
-    limit = min(params.push_yield_nm, max(params.push_yield_n * state.lever, state.meet_n * state.lever_most))
-    return max(limit, min(state.hold_nm, params.push_hold_nm, params.push_hold_n * state.lever_most))
+    gentle = min(params.push_yield_nm, params.push_yield_n * state.lever)
+    firm = max(state.meet_n * state.lever_most, min(state.hold_nm, params.push_hold_n * state.lever_most))
+    return max(gentle, min(firm, params.push_hold_nm))
 
 
 @compiled
@@ -243,14 +245,14 @@ def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     q, qd = c.measurement.q, c.measurement.qd
-    balance = dynamics.g + dynamics.c
-    tau -= balance
+    tau -= dynamics.g + dynamics.c
     joint_stop_torque(
-        tau, q, qd, params.q_min, params.q_max, params.joint_margin, params.joint_stop_stiffness,
-        params.joint_stop_damping,
+        tau, q, qd, dynamics.M, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
     )  # fmt: skip
+    tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
-    tau += balance
+    tau += dynamics.g
     friction = np.zeros(q.shape[0])
     if params.friction_compensation != 0:
         friction = joint_friction(params.friction, qd)

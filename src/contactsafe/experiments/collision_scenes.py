@@ -6,12 +6,15 @@ point of a random link will be.
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from contactsafe.envs.action import DOWN
+from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import HELD_OUT_SEED
 from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.robot.shape import arm_capsules, link_frames
@@ -60,7 +63,12 @@ class Motion:
     meets_at: float
     plant: PlantConfig
 
-    @property
+    @cached_property
+    def length_m(self) -> float:
+        """Length of the way, m."""
+        return float(np.linalg.norm(self.way))
+
+    @cached_property
     def holds(self) -> bool:
         """Whether the tool is to stay where it is."""
         return not self.way.any()
@@ -68,7 +76,7 @@ class Motion:
     @property
     def meets_s(self) -> float:
         """When the obstacle is met, s."""
-        return 0.6 if self.holds else 0.2 + self.meets_at * float(np.linalg.norm(self.way)) / self.speed_m_s
+        return 0.6 if self.holds else 0.2 + self.meets_at * self.length_m / self.speed_m_s
 
     @property
     def duration_s(self) -> float:
@@ -79,7 +87,7 @@ class Motion:
         """Give where on its way x_d is, (3,), m; it sets off after 0.2 s."""
         if self.holds:
             return self.start.position
-        share = min(max((time_s - 0.2) * self.speed_m_s / float(np.linalg.norm(self.way)), 0.0), 1.0)
+        share = min(max((time_s - 0.2) * self.speed_m_s / self.length_m, 0.0), 1.0)
         return self.start.position + share * self.way
 
     def world(self, obstacles: tuple[Obstacle, ...], real: bool) -> WorldConfig:
@@ -192,7 +200,8 @@ def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.G
     speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(2.0, 10.0)
     when = len(q_free) - 1 if motion.holds else min(round(1000 * motion.meets_s), len(q_free) - 1)
     point, normal = draw_surface_point(arm, link, rng)
-    frames = [link_frames(arm.facts, q_free[[t]]) for t in (when - 20, when)]
+    facts, _ = facts_and_tool(arm)
+    frames = [link_frames(facts, q_free[[t]]) for t in (when - 20, when)]
     before, at = ((o[0, link] + R[0, link] @ point) for o, R in frames)
     normal = frames[1][1][0, link] @ normal
     centre = at + (radius + _CLEAR_M) * normal
@@ -219,9 +228,23 @@ def draw_thing(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> O
     return Obstacle((0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S)
 
 
+def facts_and_tool(arm: Arm) -> tuple[ArmFacts, Tool]:
+    """Give what an arm was built from.
+
+    Raises:
+        InvalidInputError: it was not built from facts.
+    """
+    if arm.facts is None or arm.tool is None:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no facts to know its surface by; give contactsafe.robots.panda()"
+        )
+    return arm.facts, arm.tool
+
+
 def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
-    capsules = arm.tool.capsules if link > arm.n else arm.facts.links[link - 1].capsules
+    facts, tool = facts_and_tool(arm)
+    capsules = tool.capsules if link > arm.n else facts.links[link - 1].capsules
     capsule = capsules[rng.integers(len(capsules))]
     start, end = np.array(capsule.start), np.array(capsule.end)
     normal = rng.standard_normal(3)
@@ -239,7 +262,7 @@ def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[n
 
 def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
     """Give the least distance of a point from the arm's capsules over postures q (T, n), m."""
-    starts, ends, radii, _ = arm_capsules(arm.facts, arm.tool, q)
+    starts, ends, radii, _ = arm_capsules(*facts_and_tool(arm), q)
     along = ends - starts
     share = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
     nearest = starts + np.clip(share, 0.0, 1.0)[..., None] * along

@@ -1,84 +1,36 @@
 """Collisions nobody chose: random motions meet random obstacles anywhere along the arm; how hard, and how long?"""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
-from contactsafe.experiments.collision_scenes import LEAD_M, Meeting, Motion, draw_meetings, draw_motion
-from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.results import Experiment, Trial
+from contactsafe.errors import InvalidInputError
+from contactsafe.experiments.collision_scenes import Meeting, Motion, draw_meetings, draw_motion
+from contactsafe.experiments.config import BATCH, PLANTS, ExperimentConfig
+from contactsafe.experiments.motions import record
+from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress
+from contactsafe.experiments.verdict import verdict_table, worst_tables
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.ik import solve_ik
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds, ticks_of_step
+from contactsafe.sim.world import Worlds
 
 QUESTION = (
     "The tool sweeps or holds, wiping or in free air, and a random point of the arm meets something soft or stiff: "
     "how hard is the contact, and for how long?"
 )
-BATCH = 50
 STEADY_S = 0.5
-PLANTS = ("real", "clean")
+"""The last part of a trial, over which steady figures are means, s."""
 
-_CONTACT_N = 0.5  # obstacle force that counts as contact
+CONTACT_N = 0.5
+"""Obstacle force that counts as contact, N."""
+
 _AT_LIMIT_RAD = 1e-3
-
-
-def run_motions(
-    arm: Arm, motions: Sequence[Motion], meetings: Sequence[tuple[Meeting, ...]], config: ControllerConfig, real: bool
-) -> list[np.ndarray]:
-    """Run motions side by side, each with its own obstacles.
-
-    Returns:
-        One array of `trace_dtype` records for each, one a ms.
-    """
-    n = len(motions)
-    configs = [m.world(tuple(one.obstacle for one in met), real) for m, met in zip(motions, meetings, strict=True)]
-    worlds = Worlds(arm, configs, config, n, [m.seed for m in motions])
-    nominal = arm.nominal()
-    for i, motion in enumerate(motions):
-        worlds.reset(i, motion.q_start)
-        controller = worlds.controllers[i]
-        controller["target"]["quat"] = motion.start.quat
-        controller["target"]["K_task"] = motion.stiffness
-        controller["target"]["D_task"] = 2.0 * np.sqrt(motion.stiffness)
-        controller["output"]["position"] = controller["dynamics"]["position"]
-    trace = np.zeros((n, MAX_TICKS), dtype=trace_dtype(arm.n))
-    pieces: list[list[np.ndarray]] = [[] for _ in range(n)]
-    lengths = np.array([round(1000 * m.duration_s) for m in motions])
-    step, done = 0, 0
-    while done < lengths.max():
-        ticks = ticks_of_step(step)
-        for i, motion in enumerate(motions):
-            if done < lengths[i]:
-                _aim(worlds.controllers[i], motion, done / 1000.0, arm, nominal.handle)
-        worlds.run(np.where(done < lengths, ticks, 1), trace)
-        for i in range(n):
-            if done < lengths[i]:
-                pieces[i].append(trace[i, : min(ticks, lengths[i] - done)].copy())
-        step, done = step + 1, done + ticks
-    worlds.close()
-    return [np.concatenate(piece) for piece in pieces]
-
-
-def _aim(controller, motion: Motion, time_s: float, arm: Arm, handle) -> None:
-    """Set x_d where the motion has it, within its lead, and the posture that goes with it."""
-    position = motion.target(time_s)
-    if motion.limited:
-        away = position - controller["output"]["position"]
-        distance = float(np.linalg.norm(away))
-        if distance > LEAD_M:
-            position = controller["output"]["position"] + away * (LEAD_M / distance)
-    target = controller["target"]
-    target["position"] = position
-    q = np.empty(arm.n)
-    error, turn = solve_ik(handle, position, motion.start.quat, target["q_pose"], arm.q_min, arm.q_max, q)
-    if error < 1e-3 and turn < 1e-2:
-        target["q_pose"] = q
+_FIXED_N_M = 1e6  # what stands for the stiffness of an obstacle that cannot move
 
 
 def collisions(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
@@ -86,50 +38,145 @@ def collisions(bundle, config: ExperimentConfig, progress: Progress | None = Non
 
     Args:
         bundle: not used.
-        config: controllers and seeds.
+        config: controllers, seeds and plants.
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    trials: list[Trial] = []
-    for first in range(config.seed, config.seed + config.trials, BATCH):
-        seeds = range(first, min(first + BATCH, config.seed + config.trials))
-        trials += run_battery(controllers, seeds, progress=progress)
-    return Experiment("collisions", QUESTION, tuple(trials), ())
+    return run_battery(controllers, config.seeds, config.plants, progress)
 
 
 def run_battery(
-    controllers: dict[str, ControllerConfig],
+    controllers: Mapping[str, ControllerConfig],
     seeds: Sequence[int],
     plants: Sequence[str] = PLANTS,
     progress: Progress | None = None,
-) -> list[Trial]:
-    """Put controllers through the same collisions.
+) -> Experiment:
+    """Put controllers through the same collisions. What becomes of a seed does not depend on the others.
 
     Args:
-        controllers: configurations by name.
-        seeds: of the scenes, stepped side by side.
-        plants: 'real' for plant and sensors that differ from the model, 'clean' for ideal ones.
-        progress: told of every trial done.
+        controllers: configurations by name; they are compared with 'vices' where it is among them, else with the first.
+        seeds: one a scene: of motion, plant, obstacles and noise.
+        plants: some of `PLANTS`.
+        progress: told how many trials were just done.
+
+    Returns:
+        A trial for each seed, plant and controller, recordings of the first seed, tables of verdicts and worst trials.
+
+    Raises:
+        InvalidInputError: no controller, no seed, or a plant that is not one of `PLANTS`.
     """
+    if not controllers or not seeds or not plants or not set(plants) <= set(PLANTS):
+        raise InvalidInputError(
+            f"{len(controllers)} controllers, {len(seeds)} seeds, plants {', '.join(plants)}; "
+            f"give one or more of each, plants from {', '.join(PLANTS)}"
+        )
     arm = robots.panda()
-    motions = [draw_motion(arm, seed) for seed in seeds]
-    free = run_motions(arm, motions, [()] * len(motions), presets.vices(), real=True)
-    meetings = [draw_meetings(arm, motion, trace["q"]) for motion, trace in zip(motions, free, strict=True)]
-    trials = []
+    batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
+    # Each batch steps in native threads; several at a time, so that one steps while another is being set up.
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        done = list(
+            pool.map(
+                lambda batch: _run_batch(arm, batch, controllers, plants, progress, recorded=batch is batches[0]),
+                batches,
+            )
+        )
+    finally:
+        pool.shutdown(cancel_futures=True)
+    trials = tuple(trial for of_batch, _ in done for trial in of_batch)
+    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers)))
+    return Experiment("collisions", QUESTION, trials, tuple(done[0][1]), tables)
+
+
+def _run_batch(
+    arm: Arm,
+    seeds: Sequence[int],
+    controllers: Mapping[str, ControllerConfig],
+    plants: Sequence[str],
+    progress: Progress | None,
+    recorded: bool,
+) -> tuple[list[Trial], list[Recording]]:
+    """Give the trials of some seeds, and recordings of the first of them where wanted."""
+    batch = _Batch(arm, seeds)
+    trials: list[Trial] = []
+    recordings: list[Recording] = []
     for plant in plants:
-        for name, controller in controllers.items():
-            traces = run_motions(arm, motions, meetings, controller, real=plant == "real")
-            for i, motion in enumerate(motions):
-                metrics = collision_metrics(traces[i], free[i], arm) | scene_metrics(motion, meetings[i])
-                trials.append(Trial(scenario(motion, plant), name, motion.seed, metrics))
+        for name, traces in batch.run(controllers, plant):
+            trials += batch.trials(name, plant, traces)
+            if recorded:
+                recordings.append(batch.recording(name, plant, traces))
             if progress:
-                progress(len(motions))
-    return trials
+                progress(len(traces))
+    return trials, recordings
 
 
-def scenario(motion: Motion, plant: str) -> str:
-    """Say in words what a trial was."""
-    return f"{'hold' if motion.holds else 'sweep'} {'wiping' if motion.wiping else 'in free air'}, {plant} plant"
+def _replay(controllers: Mapping[str, ControllerConfig]) -> str:
+    """Say how one seed is run again, with {seed} in its place."""
+    if all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
+        names = "" if tuple(controllers) == ExperimentConfig.controllers else f" --controllers {','.join(controllers)}"
+        return f"contactsafe experiment collisions{names} --trials 1 --out trial-{{seed}} --seed {{seed}}"
+    return "run_battery(controllers, [{seed}])"
+
+
+class _Batch:
+    """Scenes stepped side by side.
+
+    Args:
+        arm: built from facts.
+        seeds: of the scenes.
+    """
+
+    def __init__(self, arm: Arm, seeds: Sequence[int]):
+        self.arm, self.seeds = arm, seeds
+        self.motions = [draw_motion(arm, seed) for seed in seeds]
+        nothing: list[tuple[Meeting, ...]] = [()] * len(seeds)
+        worlds = self._worlds(nothing, presets.vices(), "real")
+        self.free = record(worlds, self.motions)
+        worlds.close()
+        self.meetings = [
+            draw_meetings(arm, motion, trace["q"]) for motion, trace in zip(self.motions, self.free, strict=True)
+        ]
+
+    def run(self, controllers: Mapping[str, ControllerConfig], plant: str):
+        """Yield each controller's name and its traces, one a scene."""
+        worlds = self._worlds(self.meetings, None, plant)
+        for name, controller in controllers.items():
+            worlds.use(controller)
+            worlds.seed(self.seeds)
+            yield name, record(worlds, self.motions)
+        worlds.close()
+
+    def trials(self, controller: str, plant: str, traces: Sequence[np.ndarray]) -> list[Trial]:
+        """Summarise what one controller did."""
+        return [
+            Trial(
+                describe(motion),
+                controller,
+                motion.seed,
+                collision_metrics(trace, free, self.arm) | scene_metrics(motion, meetings),
+                plant,
+            )
+            for motion, meetings, trace, free in zip(self.motions, self.meetings, traces, self.free, strict=True)
+        ]
+
+    def recording(self, controller: str, plant: str, traces: Sequence[np.ndarray]) -> Recording:
+        """Give the first scene as a recording, its error the tool's departure from the free motion."""
+        trace = traces[0].copy()
+        trace["error"][:, :3] = self.free[0]["position"] - trace["position"]
+        heading = Trial(describe(self.motions[0]), controller, self.seeds[0], {}, plant).heading
+        return Recording(heading, controller, self.seeds[0], trace, np.zeros((1, 1, 1), np.uint8), len(trace))
+
+    def _worlds(self, meetings, controller: ControllerConfig | None, plant: str) -> Worlds:
+        configs = [
+            motion.world(tuple(meeting.obstacle for meeting in met), plant == "real")
+            for motion, met in zip(self.motions, meetings, strict=True)
+        ]
+        return Worlds(self.arm, configs, controller, len(configs), self.seeds)
+
+
+def describe(motion: Motion) -> str:
+    """Say in words what the tool was doing."""
+    return f"{'hold' if motion.holds else 'sweep'} {'wiping' if motion.wiping else 'in free air'}"
 
 
 def scene_metrics(motion: Motion, meetings: tuple[Meeting, ...]) -> dict[str, float]:
@@ -138,7 +185,7 @@ def scene_metrics(motion: Motion, meetings: tuple[Meeting, ...]) -> dict[str, fl
     return {
         "obstacles": float(len(meetings)),
         "link": float(stiffest.link),
-        "obstacle_stiffness_n_m": stiffest.obstacle.stiffness if not stiffest.obstacle.fixed else 1e6,
+        "obstacle_stiffness_n_m": _FIXED_N_M if stiffest.obstacle.fixed else stiffest.obstacle.stiffness,
         "obstacle_mass_kg": stiffest.obstacle.mass,
         "speed_m_s": 0.0 if motion.holds else motion.speed_m_s,
         "lead_limited": float(motion.limited),
@@ -154,7 +201,7 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
         arm: for its joint range.
     """
     force = trace["obstacle_force"]
-    touching = force > _CONTACT_N
+    touching = force > CONTACT_N
     steady = trace["time"] > trace["time"][-1] - STEADY_S
     tau = np.abs(trace["tau_arm"]).max(axis=1)
     away = np.linalg.norm(trace["position"] - free["position"], axis=1)

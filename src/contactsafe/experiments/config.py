@@ -1,5 +1,6 @@
 """What every experiment can be told."""
 
+import math
 from dataclasses import dataclass
 
 from contactsafe.control import presets
@@ -7,6 +8,9 @@ from contactsafe.errors import InvalidInputError
 
 BATCH = 16
 """Most trials stepped together: bounds the memory that their traces take."""
+
+PLANTS = ("real", "clean")
+"""The arm and its sensors with errors drawn at random, or just as the controller's model has them."""
 
 
 @dataclass(frozen=True)
@@ -17,11 +21,15 @@ class ExperimentConfig:
         controllers: presets by name, in the order they are reported.
         trials: seeds tried, seed, seed + 1, …
         seed: first seed.
+        plants: some of `PLANTS`, for collisions.
+        minutes: simulated time in which detection counts false alarms, min.
     """
 
     controllers: tuple[str, ...] = ("vices", "paper", "safe")
     trials: int = 10
     seed: int = 0
+    plants: tuple[str, ...] = PLANTS
+    minutes: float = 60.0
 
     def __post_init__(self):
         """Refuse unknown controllers and empty experiments."""
@@ -33,8 +41,16 @@ class ExperimentConfig:
             raise InvalidInputError(f"trials = {self.trials}; give 1 or more")
         if self.seed < 0:
             raise InvalidInputError(f"seed = {self.seed}; give 0 or more")
+        if not self.plants or not set(self.plants) <= set(PLANTS):
+            raise InvalidInputError(f"plants = {','.join(self.plants)}; choose from {', '.join(PLANTS)}")
+        if not 0 < self.minutes < math.inf:
+            raise InvalidInputError(f"minutes = {self.minutes:g}; give a number greater than 0")
+
+    @property
+    def seeds(self) -> range:
+        """All seeds, in order."""
+        return range(self.seed, self.seed + self.trials)
 
     def batches(self) -> list[range]:
         """Give the seeds in batches that are stepped together."""
-        stop = self.seed + self.trials
-        return [range(first, min(first + BATCH, stop)) for first in range(self.seed, stop, BATCH)]
+        return [self.seeds[first : first + BATCH] for first in range(0, self.trials, BATCH)]

@@ -6,13 +6,15 @@ import numpy as np
 
 from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import WipingTasks
+from contactsafe.experiments.collision_scenes import draw_plant, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
+from contactsafe.sim.config import REAL_SENSORS, WorldConfig
 
 QUESTION = (
-    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes (K1 = 75 1/s², a soft tool): "
-    "how far does the tool stray?"
+    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes (K1 = 75 1/s², a soft tool; "
+    "plant and sensors differ from the model): how far does the tool stray?"
 )
 PUSH_N = 25.0
 PUSH_S = (0.5, 2.0)
@@ -24,6 +26,7 @@ MODES = ("holding", "wiping")
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 """K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
 
+_JOINTS = 7
 _HOLD_HEIGHT = 0.06  # m above the board
 _PRESS = 0.004  # depth of x_d below the board while wiping, m
 _STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
@@ -65,7 +68,8 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
     config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS))
-    tasks = WipingTasks(config, len(seeds), list(seeds))
+    worlds = [WorldConfig(plant=draw_plant(scene_rng(seed, 0), _JOINTS), sensors=REAL_SENSORS) for seed in seeds]
+    tasks = WipingTasks(config, len(seeds), list(seeds), worlds)
     x, y, z = tasks.config.world.board.centre
     start = np.array([x, y, z + _HOLD_HEIGHT])
     if mode == "wiping":

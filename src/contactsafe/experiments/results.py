@@ -16,12 +16,19 @@ class Trial:
         controller: preset by name.
         seed: of board, start, obstacle and noise.
         metrics: figures by name; the name ends in the unit.
+        plant: what it was done with where there is a choice, 'real' or 'clean'; else empty.
     """
 
     scenario: str
     controller: str
     seed: int
     metrics: dict[str, float]
+    plant: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Under what its figures are gathered: the scenario, and the plant where there is a choice."""
+        return f"{self.scenario}, {self.plant} plant" if self.plant else self.scenario
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,29 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class Table:
+    """Figures that are no spreads over seeds.
+
+    Attributes:
+        name: in JSON.
+        title: for readers.
+        columns: their heads.
+        rows: words and numbers, one each column; NaN where a figure does not exist.
+        note: how to read it, in a sentence or two.
+    """
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str | float, ...], ...]
+    note: str = ""
+
+    def as_records(self) -> list[dict[str, Any]]:
+        """Give each row as a dictionary by column."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
+
+@dataclass(frozen=True)
 class Experiment:
     """Everything one experiment measured.
 
@@ -72,18 +102,20 @@ class Experiment:
         question: what it asks, in a sentence.
         trials: all of them.
         recordings: of the first seed, one for each scenario and controller that is to be drawn.
+        tables: what else there is to say.
     """
 
     name: str
     question: str
     trials: tuple[Trial, ...]
     recordings: tuple[Recording, ...] = ()
+    tables: tuple[Table, ...] = ()
 
     def spreads(self) -> dict[str, dict[str, dict[str, Spread]]]:
-        """Gather the trials: scenario → controller → metric → spread over seeds."""
+        """Gather the trials: heading → controller → metric → spread over seeds."""
         values: dict[str, dict[str, dict[str, list[float]]]] = {}
         for trial in self.trials:
-            row = values.setdefault(trial.scenario, {}).setdefault(trial.controller, {})
+            row = values.setdefault(trial.heading, {}).setdefault(trial.controller, {})
             for name, value in trial.metrics.items():
                 row.setdefault(name, []).append(value)
         return {
@@ -94,7 +126,7 @@ class Experiment:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Give question, spreads and trials as plain values for JSON; what does not exist is null."""
+        """Give question, tables, spreads and trials as plain values for JSON; what does not exist is null."""
         spreads = {
             scenario: {
                 controller: {name: _plain(asdict(value)) for name, value in row.items()}
@@ -103,7 +135,8 @@ class Experiment:
             for scenario, rows in self.spreads().items()
         }
         trials = [_plain(asdict(trial)) for trial in self.trials]
-        return {"question": self.question, "spread": spreads, "trials": trials}
+        tables = {table.name: _plain(table.as_records()) for table in self.tables}
+        return {"question": self.question, "tables": tables, "spread": spreads, "trials": trials}
 
 
 def spread(values: list[float]) -> Spread:

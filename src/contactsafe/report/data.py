@@ -58,6 +58,36 @@ class Recording(Protocol):
     def obstacle(self) -> tuple[float, float] | None: ...  # noqa: D102
 
 
+class Trial(Protocol):
+    """One run of one controller; `contactsafe.experiments.results.Trial` is one."""
+
+    @property
+    def scenario(self) -> str: ...  # noqa: D102
+    @property
+    def controller(self) -> str: ...  # noqa: D102
+    @property
+    def seed(self) -> int: ...  # noqa: D102
+    @property
+    def plant(self) -> str: ...  # noqa: D102
+    @property
+    def metrics(self) -> Mapping[str, float]: ...  # noqa: D102
+
+
+class Table(Protocol):
+    """Figures that are no spreads; `contactsafe.experiments.results.Table` is one."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def title(self) -> str: ...  # noqa: D102
+    @property
+    def columns(self) -> Sequence[str]: ...  # noqa: D102
+    @property
+    def rows(self) -> Sequence[Sequence[str | float]]: ...  # noqa: D102
+    @property
+    def note(self) -> str: ...  # noqa: D102
+
+
 class Experiment(Protocol):
     """What one experiment measured; `contactsafe.experiments.results.Experiment` is one."""
 
@@ -66,7 +96,11 @@ class Experiment(Protocol):
     @property
     def question(self) -> str: ...  # noqa: D102
     @property
+    def trials(self) -> Sequence[Trial]: ...  # noqa: D102
+    @property
     def recordings(self) -> Sequence[Recording]: ...  # noqa: D102
+    @property
+    def tables(self) -> Sequence[Table]: ...  # noqa: D102
 
     def spreads(self) -> Mapping[str, Mapping[str, Mapping[str, Spread]]]:
         """Scenario → controller → metric → spread over seeds."""
@@ -144,6 +178,11 @@ def ratio(value: Spread | None, baseline: Spread | None) -> float:
     if value is None or baseline is None or not baseline.median:
         return math.nan
     return value.median / baseline.median
+
+
+def cell(value: str | float) -> str:
+    """Write a table's entry: words and counts as they are, other figures with about three digits."""
+    return str(value) if isinstance(value, str | int) else number(value)
 
 
 def number(value: float) -> str:

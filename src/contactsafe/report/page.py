@@ -9,11 +9,11 @@ from typing import Any
 from contactsafe.report import data
 from contactsafe.report.data import Experiment, RunFacts
 from contactsafe.report.output import prepare_output, write_whole
-from contactsafe.report.summary import write_summary
+from contactsafe.report.summary import trials_csv, write_summary
 
 
 def write_report(folder, experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> Path:
-    """Write `report.html` and `summary.json`.
+    """Write `report.html`, `summary.json` and every experiment's trials as CSV.
 
     Args:
         folder: where to.
@@ -29,6 +29,8 @@ def write_report(folder, experiments: Sequence[Experiment], facts: RunFacts | Ma
     folder = prepare_output(folder)
     page = render(experiments, facts)
     write_summary(folder, experiments, facts)
+    for experiment in experiments:
+        write_whole(folder / f"{experiment.name}.csv", trials_csv(experiment))
     return write_whole(folder / "report.html", page)
 
 

@@ -36,6 +36,8 @@ class Aim:
             parts.append(f"{self.above:g} to {self.below:g} {unit}")
         elif self.above is not None:
             parts.append(f"over {self.above:g} {unit}")
+        elif self.below == 0:
+            parts.append("always 0")
         elif self.below is not None:
             parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
         if self.share is not None:
@@ -112,9 +114,16 @@ class Line:
         return None if aim is None else aim.judge(self.values.get(controller), self.baseline, self.row.scale)
 
 
-TITLES = {"task-safety": "Task safety", "joint-safety": "Joint safety", "disturbance": "Disturbance"}
+TITLES = {
+    "task-safety": "Task safety",
+    "joint-safety": "Joint safety",
+    "disturbance": "Disturbance",
+    "collisions": "Collisions",
+    "detection": "Detection",
+    "hostile": "Hostile policy",
+}
 
-_PUSHED = Aim(below=10.0, baseline_above=25.0, scenarios=("link 4", "link 5"))
+_PUSHED = Aim(below=10.0, baseline_above=25.0, share=1 / 3)
 
 CATALOGUE: dict[str, tuple[Row, ...]] = {
     "task-safety": (
@@ -149,6 +158,46 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("error_z_mm", "tool error, z", "mm"),
         Row("error_end_mm", "tool error at the end of the push", "mm"),
         Row("error_after_mm", "tool error after the push", "mm"),
+    ),
+    "collisions": (
+        Row("contact_peak_n", "contact force, peak", "N", main=True),
+        Row("contact_steady_n", "contact force, steady", "N", main=True),
+        Row("impulse_ns", "impulse of the contact", "N s"),
+        Row("tau_peak_nm", "external joint torque, peak", "N m"),
+        Row("tau_steady_nm", "external joint torque, steady", "N m"),
+        Row("detect_ms", "contact to its detection", "ms"),
+        Row("tool_error_mm", "tool away from its free motion, most", "mm"),
+        Row("tool_error_end_mm", "tool away from its free motion, at the end", "mm"),
+        Row("tool_force_peak_n", "tool force, peak", "N"),
+        Row("yielding_share", "time spent yielding", "%", 100.0),
+        Row("holding_share", "time spent holding", "%", 100.0),
+        Row("mode_switches", "changes of mode", ""),
+        Row("limit_touches", "touches of joint limits", ""),
+        Row("met", "trials in which the obstacle was touched, mean", "%", 100.0, mean=True),
+    ),
+    "detection": (
+        Row("within_15_ms", "reported within 15 ms, mean", "%", 100.0, main=True, aim=Aim(above=95.0), mean=True),
+        Row("within_30_ms", "reported within 30 ms, mean", "%", 100.0, main=True, aim=Aim(above=99.0), mean=True),
+        Row("detect_ms", "onset to report", "ms", main=True),
+        Row("link_right", "link named rightly, mean", "%", 100.0, main=True, aim=Aim(above=95.0), mean=True),
+        Row("own_torque_nm", "true torque on the link's own joint", "N m"),
+        Row("force_n", "force of the push", "N"),
+        Row("reported_early", "a contact reported before the push, mean", "%", 100.0, main=True, mean=True),
+        Row("false_alarms", "false alarms in a run", "", main=True, aim=Aim(below=0.0, worst=True)),
+        Row("false_contact_s", "time in contact mode without a contact", "s"),
+    ),
+    "hostile": (
+        Row("not_finite", "torques that are no number", "", main=True, aim=Aim(below=0.0, worst=True)),
+        Row("torque_violations", "torques beyond the limit", "", main=True, aim=Aim(below=0.0, worst=True)),
+        Row("torque_rate_violations", "steps beyond the rate limit", "", main=True, aim=Aim(below=0.0, worst=True)),
+        Row("joint_range_violations", "ms outside the joint range", "", main=True, aim=Aim(below=0.0, worst=True)),
+        Row("joint_range_beyond_mrad", "way outside the joint range, most", "mrad"),
+        Row("energy_given_j", "energy given to the world", "J", main=True),
+        Row(
+            "energy_most_of_bound", "energy given, share of what the tank allows", "%", 100.0, main=True,
+            aim=Aim(below=100.0, worst=True),
+        ),
+        Row("contact_peak_n", "contact force, peak", "N", main=True),
     ),
 }  # fmt: skip
 """Rows of the known experiments. Metrics not named here are in `summary.json` only."""

@@ -27,6 +27,7 @@ ABOUT = {
 }
 """The known controllers in a few words."""
 
+_OF_POLICY = ("task-safety", "joint-safety")
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
 
@@ -38,13 +39,31 @@ def parts(
     key = [f"<dt {tables.coloured(name)}>{escape(name)}</dt><dd>{escape(ABOUT.get(name, ''))}</dd>" for name in names]
     return {
         "version": escape(str(facts.get("version", contactsafe.__version__))),
-        "count": _COUNTS.get(len(names), f"{len(names)} controllers"),
+        **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers")),
         "key": "\n".join(key),
         "cards": tables.cards(experiments, names),
         "results": tables.table(experiments, names, main_only=True) + tables.tally(experiments, names),
         "sections": "\n".join(_section(experiment, names, plotter, facts) for experiment in experiments),
         "method": _method(experiments, names, facts),
     }
+
+
+def _head(experiments: Sequence[Experiment], count: str) -> dict[str, str]:
+    """Give title, headline and first sentences of the page: a policy is named only where one was run."""
+    if not experiments or any(experiment.name in _OF_POLICY for experiment in experiments):
+        what, headline = "one policy", f"One learned policy, {count}, and contacts nobody planned"
+        lead = (
+            "A learned policy wipes ink off a whiteboard with a simulated Franka Panda. It runs unchanged on each of "
+            "the controllers below; this page shows how hard they let it press: on what the tool works on, and on what "
+            "the rest of the arm runs into."
+        )
+    else:
+        what, headline = "unplanned contacts", f"{count.capitalize()}, and contacts nobody planned"
+        lead = (
+            "A simulated Franka Panda moves its tool by a script, the same for each of the controllers below; this "
+            "page shows what becomes of it when something touches the arm."
+        )
+    return {"title": f"contactsafe: {count}, {what}", "headline": headline, "lead": lead}
 
 
 def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter, facts: Mapping[str, Any]) -> str:
@@ -56,6 +75,7 @@ def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter, fac
             f'<p class="question">{escape(experiment.question)}</p>',
             _film(experiment),
             _curves(experiment, plotter, facts),
+            *(tables.plain(own) for own in experiment.tables),
             f"<h3>All figures</h3>{tables.table([experiment], names)}",
             tables.verdict(experiment, names),
             "</section>",
@@ -102,6 +122,15 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
         drawn = [_titled(name, plotter.plot(experiment, name, panels, band)) for name in names]
         said = "Departure of the tool from where it is without the push." + (" Shaded: the push." if band else "")
         return _figure(drawn, experiment, said, "plots")
+    if experiment.name == "collisions":
+        panels = [
+            Panel("contact force (N)", lambda run: run.trace["obstacle_force"]),
+            Panel("mode: 0 free, 1 yielding, 2 holding", lambda run: run.trace["mode"] * (1.0 + run.trace["holding"])),
+            Panel("tool away from its free motion (mm)", lambda run: _length(run.trace["error"][:, :3], 1000.0)),
+        ]
+        drawn = [_titled(name, plotter.plot(experiment, name, panels)) for name in names]
+        said = "Force of the obstacle on the arm, of two the larger; what the controller takes it for; the tool."
+        return _figure(drawn, experiment, said, "plots two")
     return ""
 
 
@@ -122,6 +151,10 @@ def _largest(torques: np.ndarray) -> np.ndarray:
     return np.abs(torques).max(axis=1)
 
 
+def _length(vectors: np.ndarray, scale: float) -> np.ndarray:
+    return scale * np.linalg.norm(vectors, axis=1)
+
+
 def _component(field: str, index: int, scale: float = 1.0) -> Curve:
     def curve(recording: Recording) -> np.ndarray:
         return scale * recording.trace[field][:, index]
@@ -135,13 +168,16 @@ def _method(experiments: Sequence[Experiment], names: Sequence[str], facts: Mapp
     text = (
         "<p>Contact forces and external torques are the simulator's own (MuJoCo at 1 kHz); no controller sees them. "
         "The residual is what a controller's momentum observer makes of its sensors. For one seed, all controllers get "
-        "the same boards, obstacles, pushes and sensor noise. The policy acts in task and joint safety; in the "
-        "disturbance experiment the tool holds or strokes by a script, so that all controllers are asked the same.</p>"
+        "the same boards, obstacles, pushes and sensor noise. The policy acts in task and joint safety; in "
+        "the other experiments the tool holds, strokes or sweeps by a script, so that all controllers are asked the "
+        "same.</p>"
         "<p>Tables give the median over seeds and, in brackets, the 5th and 95th percentile; "
         f"{data.MISSING} stands where no run has the figure. Curves and films show single runs, thinned for drawing so "
-        "that peaks stay. <code>summary.json</code> beside this page has every figure of every run.</p>"
+        "that peaks stay. <code>summary.json</code> and the CSV files beside this page have every figure of every "
+        "run.</p>"
         "<p><strong>What this does not show.</strong> Everything here is simulated, with an arm that is what the "
-        "controllers' model of it says; a real one is not. The figures compare controllers under equal conditions. "
+        "controllers' model of it says, or in collisions and detection one with errors drawn at random; a real one "
+        "differs in other ways too. The figures compare controllers under equal conditions. "
         "They are no certificate, and no proof that any contact with a person is harmless.</p>"
     )
     found = {

@@ -1,6 +1,9 @@
-"""`summary.json`: every figure with its spread, and what made it."""
+"""`summary.json`: every figure with its spread, and what made it; the trials as CSV."""
 
+import csv
+import io
 import json
+import math
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -41,6 +44,19 @@ def summarise(experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, 
         "versions": versions(),
         "experiments": {experiment.name: experiment.as_dict() for experiment in experiments},
     }
+
+
+def trials_csv(experiment: Experiment) -> str:
+    """Write the trials as CSV: a row each, a column for every metric; empty where a figure does not exist."""
+    metrics = list(dict.fromkeys(name for trial in experiment.trials for name in trial.metrics))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["seed", "scenario", "controller", "plant", *metrics])
+    for trial in experiment.trials:
+        values = (trial.metrics.get(name, math.nan) for name in metrics)
+        figures = [repr(float(value)) if math.isfinite(value) else "" for value in values]
+        writer.writerow([trial.seed, trial.scenario, trial.controller, trial.plant, *figures])
+    return text.getvalue()
 
 
 def versions() -> dict[str, str]:

@@ -1,19 +1,21 @@
 """The experiments' main figures as plain text."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 
 from contactsafe.report import data, rows
-from contactsafe.report.data import Experiment, Spread
+from contactsafe.report.data import Experiment, Spread, Table
 
 _LABEL = 31
+_WIDTH = 110
 
 
 def terminal_table(experiments: Sequence[Experiment]) -> str:
     """Write the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
 
     The last columns give the ratio of the last controller's median to the baseline's, and the aim with "ok" or "MISSED"
-    where it can be judged.
+    where it can be judged. The experiments' own tables follow.
 
     Args:
         experiments: what was measured.
@@ -29,7 +31,21 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
         for heading, labelled in rows.groups(experiment, main_only=True):
             table.append([f"{title}: {heading}"])
             table += [_row(label, line, names) for label, line in labelled]
-    return _align(table)
+    return "\n\n".join([_align(table), *(_plain(own) for experiment in experiments for own in experiment.tables)])
+
+
+def _plain(table: Table) -> str:
+    """Write a table as it is: its first column to the left, words to the left, numbers to the right."""
+    cells = [[_ascii(data.cell(value)) for value in row] for row in table.rows]
+    widths = [max(map(len, column)) for column in zip(table.columns, *cells, strict=True)]
+    words = [i == 0 or all(isinstance(row[i], str) for row in table.rows) for i in range(len(widths))]
+
+    def line(row: Sequence[str]) -> str:
+        padded = [c.ljust(w) if left else c.rjust(w) for c, w, left in zip(row, widths, words, strict=True)]
+        return "  " + "  ".join(padded).rstrip()
+
+    note = textwrap.wrap(_ascii(table.note), _WIDTH, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join([_ascii(table.title), line(table.columns), *map(line, cells), *note])
 
 
 def _row(label: str, line: rows.Line, names: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from html import escape
 
 from contactsafe.report import data, rows
-from contactsafe.report.data import BASELINE, MISSING, Experiment, Spread
+from contactsafe.report.data import BASELINE, MISSING, Experiment, Spread, Table
 from contactsafe.report.rows import Line
 
 HEADLINES = (
@@ -102,6 +102,23 @@ def _mark(line: Line, name: str) -> str:
         return '<span class="mark"></span>'
     kind, title, sign = ("yes", "reached", "✓") if reached else ("no", "missed", "✗")
     return f'<span class="mark {kind}" title="{title}">{sign}</span>'
+
+
+def plain(table: Table) -> str:
+    """Write one of an experiment's own tables."""
+    left = [i == 0 or all(isinstance(row[i], str) for row in table.rows) for i in range(len(table.columns))]
+
+    def cells(row: Sequence[str | float], tag: str) -> str:
+        marks = [' class="word"' if word else "" for word in left]
+        return "".join(f"<{tag}{m}>{escape(data.cell(c))}</{tag}>" for m, c in zip(marks, row, strict=True))
+
+    head = f"<tr>{cells(table.columns, 'th')}</tr>"
+    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
+    return (
+        f"<h3>{escape(table.title)}</h3>"
+        f'<div class="wide"><table><thead>{head}</thead><tbody>{body}</tbody></table></div>'
+        f'<p class="note">{escape(table.note)}</p>'
+    )
 
 
 def tally(experiments: Sequence[Experiment], names: Sequence[str]) -> str:

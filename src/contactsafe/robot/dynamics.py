@@ -22,7 +22,8 @@ from contactsafe.robot.native import (
 )
 
 _VIEWED = (
-    "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot", "cvel", "cinert",
+    "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot",
+    "cvel", "cinert",
 )  # fmt: skip
 
 handle_dtype = np.dtype(

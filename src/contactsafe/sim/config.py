@@ -89,7 +89,7 @@ class SensorConfig:
 NO_NOISE = SensorConfig(0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 REAL_SENSORS = SensorConfig(q_rad=0.0, encoder_step_rad=2 * math.pi / 2**19, velocity_filter_hz=100.0)
-"""Encoders of 19 bit, velocity from their difference, low-passed; the noise of torque and wrist sensor as by default."""
+"""Encoders of 19 bit, velocity from their difference, low-passed; torque and wrist sensor as by default."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
-from contactsafe.control.records import controller_dtype
+from contactsafe.control.records import controller_dtype, fill_params
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask
@@ -62,6 +62,11 @@ def _plants(arm: Arm, configs: list[WorldConfig]) -> list[mujoco.MjModel]:
     ]  # fmt: skip
 
 
+def _check_tick(controller: ControllerConfig | None) -> None:
+    if controller is not None and controller.dt != TICK_S:
+        raise InvalidInputError(f"controller dt = {controller.dt} s; simulated worlds tick every {TICK_S} s")
+
+
 class Worlds:
     """N independent worlds, stepped in native threads.
 
@@ -93,8 +98,7 @@ class Worlds:
     ):
         self.arm, self.n = arm, n
         self.configs = _one_each(world, n)
-        if controller is not None and controller.dt != TICK_S:
-            raise InvalidInputError(f"controller dt = {controller.dt} s; simulated worlds tick every {TICK_S} s")
+        _check_tick(controller)
         self.config = self.configs[0]
         self.models = _plants(arm, self.configs)
         self.datas = [mujoco.MjData(model) for model in self.models]
@@ -117,6 +121,18 @@ class Worlds:
         self._threads = ThreadPoolExecutor(min(n, os.cpu_count() or 1)) if n > 1 else None
         self.seed(seed)
 
+    def use(self, controller: ControllerConfig) -> None:
+        """Put another controller in charge of every world, which costs far less than worlds of its own.
+
+        Seed and reset them next: they then do what new worlds under that controller would do.
+
+        Raises:
+            InvalidInputError: its tick is not that of the worlds.
+        """
+        _check_tick(controller)
+        for record in self.controllers:
+            fill_params(record["params"], controller, self.arm)
+
     def seed(self, seed: int | Sequence[int] | None) -> None:
         """Start the worlds' noise anew, from one seed for all or one for each."""
         if seed is None or isinstance(seed, int | np.integer):
@@ -130,6 +146,7 @@ class Worlds:
         q = self.arm.joint_vector(q, "q")
         model, data, plant = self.models[i], self.datas[i], self.plants[i]
         mujoco.mj_resetData(model, data)
+        model.qpos_spring[self.arm.n :] = model.qpos0[self.arm.n :]  # obstacles that travelled are back
         data.qpos[: self.arm.n] = q
         self._owners[i].reset(q)
         dynamics = self.arm.dynamics(q, np.zeros(self.arm.n))

@@ -1,0 +1,120 @@
+"""A hostile policy: random, extreme, jumping and unusable targets; does the arm keep every limit it promises?"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from contactsafe.control import presets
+from contactsafe.experiments.collision_scenes import draw_plant, draw_thing, scene_rng
+from contactsafe.experiments.config import ExperimentConfig
+from contactsafe.experiments.results import Experiment, Trial
+from contactsafe.experiments.run import Progress
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.rotation import rotvec_to_quat
+from contactsafe.sim.config import REAL_SENSORS, Obstacle, WorldConfig
+from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.world import MAX_TICKS, Worlds
+
+QUESTION = (
+    "Targets are random, extreme, jump, and hold numbers that are none, among things in the arm's way: are torque, "
+    "torque rate and joint range kept, and how much energy does the arm give away?"
+)
+TICKS = 10_000
+"""Of one trial; 100 trials are a million."""
+
+_RATE_TOLERANCE_NM = 1e-9
+_THINGS = 3
+
+
+def hostile(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+    """Run the experiment; it needs no policy.
+
+    Args:
+        bundle: not used.
+        config: controllers and seeds; each trial is `TICKS` long.
+        progress: told of every trial done.
+    """
+    arm = robots.panda()
+    trials: list[Trial] = []
+    for name in config.controllers:
+        for seeds in config.batches():
+            metrics = run_hostile(arm, presets.by_name(name), seeds)
+            trials += [Trial("hostile policy", name, seed, row) for seed, row in zip(seeds, metrics, strict=True)]
+            if progress:
+                progress(len(seeds))
+    return Experiment("hostile", QUESTION, tuple(trials))
+
+
+def run_hostile(arm: Arm, controller, seeds, ticks: int = TICKS) -> list[dict[str, float]]:
+    """Let a hostile policy loose on one arm for each seed.
+
+    Returns:
+        For each, what it found; see `limit_metrics`.
+    """
+    rngs = [scene_rng(seed, 2) for seed in seeds]
+    worlds = Worlds(arm, [_world(arm, rng) for rng in rngs], controller, len(seeds), list(seeds))
+    for i in range(len(seeds)):
+        worlds.reset(i, arm.home)
+    trace = np.zeros((len(seeds), MAX_TICKS), dtype=trace_dtype(arm.n))
+    pieces: list[np.ndarray] = []
+    while MAX_TICKS * len(pieces) < ticks:
+        for i, rng in enumerate(rngs):
+            if rng.random() < 0.2:
+                spoil_target(worlds.controllers[i]["target"], arm, rng)
+        worlds.run(MAX_TICKS, trace)
+        pieces.append(trace.copy())
+    worlds.close()
+    traces = np.concatenate(pieces, axis=1)
+    return [limit_metrics(traces[i], arm, controller) for i in range(len(seeds))]
+
+
+def _world(arm: Arm, rng: np.random.Generator) -> WorldConfig:
+    things = tuple(_thing(rng) for _ in range(_THINGS))
+    return WorldConfig(plant=draw_plant(rng, arm.n), sensors=REAL_SENSORS, obstacles=things)
+
+
+def _thing(rng: np.random.Generator) -> Obstacle:
+    """Draw something in the arm's reach, clear of where it stands at first."""
+    angle, distance = rng.uniform(0.5, 2 * np.pi - 0.5), rng.uniform(0.35, 0.6)
+    position = (float(distance * np.cos(angle)), float(distance * np.sin(angle)), float(rng.uniform(0.2, 0.8)))
+    return replace(draw_thing(rng, rng.uniform(0.03, 0.08), may_be_fixed=True), position=position)
+
+
+def spoil_target(target, arm: Arm, rng: np.random.Generator) -> None:
+    """Write a target that no sane policy would ask for into a `target_dtype` record."""
+    scale = 10.0 ** rng.uniform(-2, 3)
+    target["position"] = np.array([0.4, 0.0, 0.4]) + scale * rng.standard_normal(3)
+    target["quat"] = rotvec_to_quat(rng.uniform(-np.pi, np.pi, 3))
+    target["K_task"] = rng.choice([10.0, 1500.0, rng.uniform(10, 1500)], 6)
+    target["D_task"] = rng.choice([2.0, 120.0, rng.uniform(2, 120)], 6)
+    target["q_pose"] = rng.uniform(4 * arm.q_min, 4 * arm.q_max)
+    if rng.random() < 0.3:
+        field = rng.choice(["position", "quat", "K_task", "D_task", "q_pose"])
+        target[field][rng.integers(target[field].shape[0])] = rng.choice([np.nan, np.inf, -np.inf, 1e300, -5.0, 0.0])
+
+
+def limit_metrics(trace: np.ndarray, arm: Arm, controller) -> dict[str, float]:
+    """Count what a run broke, and compare the energy that it gave away with what the tank allows.
+
+    Args:
+        trace: `trace_dtype` records, one a ms, from rest, (T,).
+        arm: for its limits.
+        controller: its configuration, for the tank.
+    """
+    torque, q = trace["torque"], trace["q"]
+    steps = np.abs(np.diff(torque, axis=0))
+    given = -np.cumsum(np.einsum("ti,ti->t", trace["tau_arm"][:-1], np.diff(q, axis=0)))
+    allowed = controller.tank_j + controller.tank_power_w * trace["time"][1:]
+    beyond = np.maximum(arm.q_min - q, q - arm.q_max)
+    return {
+        "not_finite": float(np.count_nonzero(~np.isfinite(torque))),
+        "torque_violations": float(np.count_nonzero(np.abs(torque) > arm.tau_max)),
+        "torque_rate_violations": float(np.count_nonzero(steps > arm.torque_rate_max * 0.001 + _RATE_TOLERANCE_NM)),
+        "joint_range_violations": float(np.count_nonzero((beyond > 0.0).any(axis=1))),
+        "joint_range_beyond_mrad": float(max(1000.0 * beyond.max(), 0.0)),
+        "energy_given_j": float(given[-1]),
+        "energy_most_of_bound": float((given / allowed).max()),
+        "contact_peak_n": float(trace["obstacle_force"].max()),
+        "seconds": float(len(trace) / 1000.0),
+    }

@@ -1,0 +1,88 @@
+"""Playing motions in simulated worlds: x_d goes its way, at 60 Hz as a policy would move it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from contactsafe.experiments.collision_scenes import LEAD_M, Motion
+from contactsafe.robot.ik import solve_ik
+from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.world import MAX_TICKS, Worlds, ticks_of_step
+
+
+class Playback:
+    """Motions played side by side, one in each world, from their beginning.
+
+    Args:
+        worlds: to play them in; reset.
+        motions: one for each.
+
+    Attributes:
+        ticks: played so far.
+        lengths: of the motions, ticks, (n,).
+    """
+
+    def __init__(self, worlds: Worlds, motions: Sequence[Motion]):
+        self.worlds, self.motions, self.ticks = worlds, motions, 0
+        self.lengths = np.array([round(1000 * motion.duration_s) for motion in motions])
+        self._step, self._nominal = 0, worlds.arm.nominal()
+        self._target, self._tool = worlds.controllers["target"], worlds.controllers["output"]["position"]
+        for i, motion in enumerate(motions):
+            worlds.reset(i, motion.q_start)
+            self._target["quat"][i] = motion.start.quat
+            self._target["K_task"][i] = motion.stiffness
+            self._target["D_task"][i] = 2.0 * np.sqrt(motion.stiffness)
+        self._tool[:] = worlds.controllers["dynamics"]["position"]
+
+    @property
+    def running(self) -> np.ndarray:
+        """Whether each motion is not over yet, (n,)."""
+        return self.ticks < self.lengths
+
+    def step(self, trace: np.ndarray | None = None) -> int:
+        """Play one policy step, or a single tick of what is over.
+
+        Args:
+            trace: `trace_dtype` records to fill, (n, MAX_TICKS).
+
+        Returns:
+            Its ticks.
+        """
+        running, ticks = self.running, ticks_of_step(self._step)
+        for i in np.flatnonzero(running).tolist():
+            self._aim(i, self.ticks / 1000.0)
+        self.worlds.run(np.where(running, ticks, 1), trace)
+        self._step, self.ticks = self._step + 1, self.ticks + ticks
+        return ticks
+
+    def _aim(self, i: int, time_s: float) -> None:
+        """Set x_d where the motion has it, within its lead, and the posture that goes with it."""
+        motion, arm, tool, q_pose = self.motions[i], self.worlds.arm, self._tool[i], self._target["q_pose"][i]
+        position = motion.target(time_s)
+        if motion.limited:
+            away = position - tool
+            distance = math.sqrt(away @ away)
+            if distance > LEAD_M:
+                position = tool + away * (LEAD_M / distance)
+        self._target["position"][i] = position
+        q = np.empty(arm.n)
+        error, turn = solve_ik(self._nominal.handle, position, motion.start.quat, q_pose, arm.q_min, arm.q_max, q)
+        if error < 1e-3 and turn < 1e-2:
+            q_pose[:] = q
+
+
+def record(worlds: Worlds, motions: Sequence[Motion]) -> list[np.ndarray]:
+    """Play motions to their end.
+
+    Returns:
+        One array of `trace_dtype` records for each, one a ms.
+    """
+    play = Playback(worlds, motions)
+    step = np.zeros((worlds.n, MAX_TICKS), dtype=trace_dtype(worlds.arm.n))
+    traces = np.zeros((worlds.n, int(play.lengths.max()) + MAX_TICKS), dtype=step.dtype)
+    while play.running.any():
+        start = play.ticks
+        ticks = play.step(step)
+        traces[:, start : start + ticks] = step[:, :ticks]
+    return [trace[:length] for trace, length in zip(traces, play.lengths, strict=True)]
