@@ -10,6 +10,9 @@ from contactsafe.robot.mjcf import arm_mjcf
 
 STIFFNESS = np.full(6, 150.0)
 
+UNTOUCHED = np.zeros(6)
+"""What a force sensor reads while nothing touches the tool."""
+
 
 class Plant:
     """An arm without friction, noise or delay; xfrc_applied pushes it, and springs may stand in its way.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.control.plant import STIFFNESS, Plant, controller_at, hold, reach
+from tests.control.plant import STIFFNESS, UNTOUCHED, Plant, controller_at, hold, reach
 
 from contactsafe import Pose, Target, presets
 from contactsafe.control.laws import task_error
@@ -78,7 +78,7 @@ def test_contact_law_cancels_what_the_residual_shows_and_nothing_else(quick_pand
     still, K, D, in_contact = hold(quick_panda), 150.0, 2 * np.sqrt(150.0), 0
     for _ in range(600):
         now, truth = quick_panda.dynamics(plant.q, plant.qd), plant.push_torque()
-        out = plant.run(controller, still, 1)
+        out = plant.run(controller, still, 1, UNTOUCHED)
         if out.contact.in_contact:
             in_contact += 1
             acceleration = now["J"] @ plant.data.qacc + now["Jdot_qd"]

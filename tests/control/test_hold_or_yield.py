@@ -1,10 +1,11 @@
-"""Yield to what the arm ran into, hold against what pushes it; and never push an obstacle harder than the bound."""
+"""Yield to what is in the way, hold against what pushes; and never push a contact harder than the bound in force."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.control.plant import Plant, controller_at, hold, reach, wrist_meets_sphere
+from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
+from tests.control.targets import hostile_target
 
 from contactsafe import presets
 from contactsafe.control.laws import push_along
@@ -12,59 +13,194 @@ from contactsafe.control.laws import push_along
 SAFE = replace(presets.safe(), friction_compensation=False)
 
 
-def collision(panda, stiffness):
+def collision(panda, stiffness, seconds=2.0):
     """Send the tool sideways by 25 cm, 5 cm ahead at most, the wrist against a sphere; yield what happens each tick."""
     plant = wrist_meets_sphere(panda, 0.04, stiffness)
     controller = controller_at(panda, SAFE)
     start = plant.tool_position()[1]
-    for k in range(120):
-        ahead = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
-        target = reach(panda, [0.0, ahead, 0.0])
-        for _ in range(17):
-            out = plant.run(controller, target, 1)
-            yield out, controller, plant
+    for k in range(round(seconds * 1000)):
+        if k % 17 == 0:
+            target = reach(panda, [0.0, min(0.25, 0.125 * k / 1000, plant.tool_position()[1] - start + 0.05), 0.0])
+        out = plant.run(controller, target, 1, UNTOUCHED)
+        yield out, controller, plant
+
+
+def commanded_push(controller, out):
+    """Give what the command pushes along the contact with, N m: torque less c, g and friction."""
+    now, state = controller.record["dynamics"], controller.record["state"]
+    net = out.torque - now["c"] - now["g"] - state["friction"]
+    return push_along(state["direction"].copy(), now["M_inv"].copy(), net)
+
+
+def spring_torque(plant):
+    return np.linalg.norm(plant.data.qfrc_constraint[:7])
+
+
+def spring_force(plant):
+    return np.linalg.norm(plant.data.qfrc_constraint[7:10])
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
-    outs = [out.contact for out, _, _ in collision(panda, stiffness)]
-    assert any(contact.in_contact for contact in outs)
-    assert not any(contact.holding for contact in outs)
+    """Never held against; after the blow it leaves 4 to 8 N of the 24 N with which the task alone presses."""
+    contacts, forces = [], []
+    for out, _, plant in collision(panda, stiffness):
+        contacts.append(out.contact)
+        forces.append(spring_force(plant))
+    assert any(contact.in_contact for contact in contacts)
+    assert not any(contact.holding for contact in contacts)
+    assert SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness):
-    """Torque less c and g, along the contact; damping into the contact comes on top and only makes it less.
+    """Damping into the contact comes on top and only makes it less. It falls from the meeting's to the yielding one.
 
     Left out are ticks in which the torque rate was the limit: the bound is reached as fast as that allows.
     """
-    pushes = []
+    pushes, limits = [], []
     for out, controller, _ in collision(panda, stiffness):
-        if out.contact.in_contact and not out.contact.holding and not out.limited:
-            now, state = controller.record["dynamics"], controller.record["state"]
-            net = out.torque - now["c"] - now["g"]
-            pushes.append(push_along(state["direction"].copy(), now["M_inv"].copy(), net))
+        if out.contact.in_contact and not out.limited:
+            pushes.append(commanded_push(controller, out))
+            limits.append(float(controller.record["output"]["push_limit_nm"]))
     assert len(pushes) > 300
-    assert max(pushes) <= SAFE.push_yield_nm + 1e-9
-    assert max(pushes) > 0.99 * SAFE.push_yield_nm
+    assert (np.array(pushes) <= np.array(limits) + 1e-9).all()
+    assert max(pushes) > 0.99 * min(limits)
+    assert max(limits) <= SAFE.push_yield_nm
+    lever = min(limits) / SAFE.push_yield_n
+    assert 0.2 < lever < 0.7
 
 
-@pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
-def test_steady_torque_of_an_obstacle_is_the_bound(panda, stiffness):
-    """Slowly giving way, the arm feels from the obstacle what it pushes it with: 3 N m, however stiff it is."""
-    *_, (_, _, plant) = collision(panda, stiffness)
-    truth = np.linalg.norm(plant.data.qfrc_constraint[:7])
-    assert truth == pytest.approx(SAFE.push_yield_nm, rel=0.02)
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    "tank_j",
+    [
+        np.inf,
+        pytest.param(
+            SAFE.tank_j,
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason="the energy limit comes after the bound and takes torque off along the motion: it lets the "
+                "command push up to 340 N m harder than the bound (26 N m where torque and its rate are limited)",
+            ),
+        ),
+    ],
+    ids=["no tank", "tank"],
+)
+def test_bound_holds_whatever_is_asked_and_whatever_pushes(quick_panda, tank_j, seed):
+    """Hostile targets, pushes anywhere, motors without limits; where no joint stop is in force."""
+    rng, plant = np.random.default_rng(seed), Plant(quick_panda)
+    controller, over = controller_at(quick_panda, replace(presets.safe(), tank_j=tank_j)), []
+    inner = quick_panda.q_min + SAFE.joint_margin, quick_panda.q_max - SAFE.joint_margin
+    for k in range(3000):
+        if k % 170 == 0:
+            target = hostile_target(quick_panda, rng)
+        if k % 500 == 0:
+            plant.data.xfrc_applied[:] = 0.0
+            plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
+        q = plant.q
+        out = plant.run(controller, target, 1, UNTOUCHED)
+        if out.contact.in_contact and (q > inner[0]).all() and (q < inner[1]).all():
+            over.append(commanded_push(controller, out) - float(controller.record["output"]["push_limit_nm"]))
+    assert len(over) > 500
+    assert max(over) < 1e-9
 
 
 @pytest.mark.parametrize("body", ["link4", "link5"])
 @pytest.mark.parametrize("force", [(0.0, 25.0, 0.0), (0.0, -25.0, 0.0), (25.0, 0.0, 0.0)])
 def test_lasting_push_is_held_against(panda, body, force):
-    plant, controller = Plant(panda), controller_at(panda, SAFE)
-    plant.run(controller, hold(panda), 100)
+    """The tool leaves its place by 4.3 mm at the most while it is found out who pushes, and 3 s later is back to 3."""
+    plant, controller, still, away = Plant(panda), controller_at(panda, SAFE), hold(panda), []
+    plant.run(controller, still, 100, UNTOUCHED)
     before = plant.tool_position()
     plant.push(body, force)
-    out = plant.run(controller, hold(panda), 1500)
+    for _ in range(3000):
+        out = plant.run(controller, still, 1, UNTOUCHED)
+        away.append(np.linalg.norm(plant.tool_position() - before))
     assert out.contact.in_contact
     assert out.contact.holding
-    assert np.abs(plant.tool_position() - before).max() < 0.010
+    assert max(away) < 0.010
+    assert away[-1] < 0.004
+
+
+def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
+    """`hold_margin` times it; tried again after `hold_s`, then twice, four times as long."""
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.push("link5", (0.0, 25.0, 0.0))
+    still = hold(panda)
+    state, times, held = controller.record["state"], [], []
+    for k in range(4000):
+        plant.run(controller, still, 1, UNTOUCHED)
+        if state["holding"] and (not times or state["hold_s"] > times[-1][1]):
+            times.append((k, float(state["hold_s"])))
+            held.append(float(state["hold_nm"]) / float(state["torque_smooth_nm"]))
+    assert [hold_s for _, hold_s in times[:3]] == [SAFE.hold_s, 2 * SAFE.hold_s, 4 * SAFE.hold_s]
+    assert held == pytest.approx([SAFE.hold_margin] * len(held), rel=0.01)
+
+
+@pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
+def test_there_is_no_second_blow_of_an_obstacle_that_stays(panda, stiffness):
+    """The arm comes back to it every 1.5 s or so; never with half the torque of the first time. Torque stays smooth."""
+    torques, commands, contacts = [], [], []
+    for out, _, plant in collision(panda, stiffness, seconds=7.0):
+        torques.append(spring_torque(plant))
+        commands.append(out.torque)
+        contacts.append(out.contact.in_contact)
+    assert np.abs(np.diff(commands, axis=0)).max() <= 1.0
+    contacts = np.array(contacts)
+    ends = np.flatnonzero(contacts[:-1] & ~contacts[1:])
+    assert len(ends) >= 2
+    assert max(torques[ends[0] :]) < 0.6 * max(torques[: ends[0]])
+
+
+def released(arm, body, force):
+    """Push for 1.5 s, let go; give the torques, the joints' speeds and whether in contact, tick by tick from then."""
+    plant, controller, still = Plant(arm), controller_at(arm, SAFE), hold(arm)
+    plant.run(controller, still, 100, UNTOUCHED)
+    plant.push(body, force)
+    plant.run(controller, still, 1500, UNTOUCHED)
+    plant.push(body, (0.0, 0.0, 0.0))
+    torque, speed, contact, away = [], [], [], []
+    before = arm.tool_pose(arm.home).position
+    for _ in range(3000):
+        out = plant.run(controller, still, 1, UNTOUCHED)
+        torque.append(out.torque)
+        speed.append(np.abs(plant.qd).max())
+        contact.append(out.contact.in_contact)
+        away.append(np.linalg.norm(plant.tool_position() - before))
+    end = contact.index(False)
+    assert end > 900
+    assert not any(contact[end:])
+    return np.array(torque), np.array(speed), end, max(away)
+
+
+PUSHES = [("link5", (0.0, 40.0, 0.0)), ("link4", (0.0, -40.0, 0.0))]
+
+
+@pytest.mark.parametrize(("body", "force"), PUSHES)
+def test_tool_stays_where_it_is_when_the_pusher_lets_go(panda, body, force):
+    torque, *_, away = released(panda, body, force)
+    assert away < 0.005
+    assert np.abs(np.diff(torque, axis=0)).max() <= 1.0
+
+
+SWINGS = pytest.mark.xfail(
+    strict=True,
+    reason="the posture comes back whole in one tick when contact ends: the command jumps by 14.5 N m and the arm "
+    "swings at 1.05 rad/s after 40 N on link 4, at 0.43 rad/s (5.9 N m) after 40 N on link 5",
+)
+
+
+@SWINGS
+@pytest.mark.parametrize(("body", "force"), PUSHES)
+def test_command_does_not_jump_when_contact_ends(quick_panda, body, force):
+    """Motors that take any torque at once show what the law asks."""
+    torque, _, end, _ = released(quick_panda, body, force)
+    assert np.abs(torque[end] - torque[end - 1]).max() < 1.0
+
+
+@SWINGS
+@pytest.mark.parametrize(("body", "force"), PUSHES)
+def test_arm_does_not_swing_back_when_contact_ends(panda, body, force):
+    _, speed, end, _ = released(panda, body, force)
+    assert speed[end:].max() < 0.25

@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from contactsafe.control.laws import (
+    clip_error,
     contact_nullspace,
-    impedance_wrench,
-    posture_torque,
+    damping_wrench,
     push_along,
+    stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
+    tool_share,
 )
 from contactsafe.robot.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
 
@@ -122,17 +124,44 @@ def test_contact_in_task_directions_leaves_the_null_space_alone(seed):
     assert_array_equal(contact_nullspace(N_t, M_inv, np.zeros(7)), N_t)
 
 
-def test_impedance_wrench_gives_each_axis_its_own_acceleration():
-    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇)."""
+def test_impedance_gives_each_axis_its_own_acceleration():
+    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), the pull and the damping apart."""
     K, D = np.arange(10.0, 16.0), np.arange(1.0, 7.0)
     e, v, a = np.full(6, 0.1), np.full(6, 0.2), np.full(6, 0.3)
-    F = impedance_wrench(2.0 * np.eye(6), e, v, a, K, D)
-    assert_allclose(F, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
+    pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K), damping_wrench(2.0 * np.eye(6), v, a, D)
+    assert_allclose(pull, 0.2 * K, rtol=0, atol=1e-14)
+    assert_allclose(pull + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
 
 
-def test_posture_torque_pulls_towards_the_posture_and_against_motion():
-    tau = posture_torque(np.array([1.0, 0.0]), np.zeros(2), np.array([0.0, 0.5]), np.array([4.0, 4.0]), np.full(2, 6.0))
-    assert_array_equal(tau, [4.0, -3.0])
+@given(seeds, st.floats(0.0, 60.0), st.floats(0.0, 40.0))
+def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed, touch, bound):
+    """Along the force felt; and where the pull is within the bound, or leads away, nothing is taken off it."""
+    rng = np.random.default_rng(seed)
+    F, n = rng.normal(size=6) * 30.0, rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    share = tool_share(F, touch * n, 3.0, bound)
+    push = -n @ F[:3]
+    assert 0.0 <= share <= 1.0
+    if touch < 3.0 or push <= bound:
+        assert share == 1.0
+    else:
+        assert_allclose(share * push, bound, rtol=1e-9, atol=1e-9)
+
+
+@given(seeds, st.floats(1e-3, 0.5), st.floats(1e-2, 2.0))
+def test_clipped_error_keeps_its_direction_and_no_more_than_its_length(seed, length_max, angle_max):
+    asked = np.random.default_rng(seed).normal(size=6) * 10.0 ** np.random.default_rng(seed).uniform(-4, 1)
+    error = asked.copy()
+    clip_error(error, length_max, angle_max)
+    for part, most in ((slice(0, 3), length_max), (slice(3, 6), angle_max)):
+        size = np.linalg.norm(asked[part])
+        assert_allclose(error[part], asked[part] * min(1.0, most / size), rtol=1e-12, atol=0)
+
+
+def test_error_without_a_bound_is_left_alone():
+    error = np.arange(6.0)
+    clip_error(error, np.inf, np.inf)
+    assert_array_equal(error, np.arange(6.0))
 
 
 @given(seeds, st.floats(1e-3, 3.1))

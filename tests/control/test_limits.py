@@ -35,30 +35,60 @@ def test_limit_is_reached_exactly():
 
 
 Q_MIN, Q_MAX = np.array([-2.0, -3.0]), np.array([2.0, -0.1])
+MARGIN, STIFFNESS, DAMPING = 0.1, 200.0, 30.0
 
 
-def stop(q, qd):
-    return joint_stop_torque(np.array(q), np.array(qd), Q_MIN, Q_MAX, 0.1, 200.0, 30.0)
+def stop(tau, q, qd):
+    """Give what a command becomes at the joint stops."""
+    out = np.array(tau, dtype=float)
+    joint_stop_torque(out, np.array(q), np.array(qd), Q_MIN, Q_MAX, MARGIN, STIFFNESS, DAMPING)
+    return out
 
 
-@given(st.floats(-1.9, 1.9), st.floats(-2.9, -0.2), st.floats(-5, 5), st.floats(-5, 5))
-def test_no_joint_stop_away_from_the_limits(q0, q1, qd0, qd1):
-    assert_array_equal(stop([q0, q1], [qd0, qd1]), 0.0)
+commands, speeds = st.floats(-100, 100), st.floats(-5, 5)
 
 
-def test_joint_stop_is_a_spring_from_the_margin_on():
-    """0.05 rad inside the margin of 0.1: 200 N m/rad give 10 N m, inwards at either end."""
-    assert_allclose(stop([-1.95, -0.15], [0.0, 0.0]), [10.0, -10.0], rtol=1e-12)
+@given(commands, commands, st.floats(-1.9, 1.9), st.floats(-2.9, -0.2), speeds, speeds)
+def test_away_from_the_limits_nothing_changes(tau0, tau1, q0, q1, qd0, qd1):
+    assert_array_equal(stop([tau0, tau1], [q0, q1], [qd0, qd1]), [tau0, tau1])
+
+
+@given(commands, st.floats(0.0, 0.5), speeds)
+def test_joint_stop_never_pulls_towards_the_limit(tau, depth, qd):
+    """What is added points inwards at either end, and both ends are alike."""
+    low = stop([tau, 0.0], [-1.9 - depth, -2.0], [qd, 0.0])[0]
+    high = stop([-tau, 0.0], [1.9 + depth, -2.0], [-qd, 0.0])[0]
+    assert low >= tau
+    assert_allclose(high, -low, rtol=1e-12, atol=1e-12)
+
+
+@given(commands, st.floats(0.1, 0.5), speeds)
+def test_at_the_limit_and_beyond_no_command_pushes_outwards(tau, depth, qd):
+    """There the spring alone is left of a command that leads out: 200 N m/rad × 0.1 rad and more."""
+    left = stop([tau, 0.0], [-1.9 - depth, -2.0], [qd, 0.0])[0]
+    assert left >= STIFFNESS * MARGIN * 0.999
+
+
+@given(st.floats(0.0, 100.0), st.floats(0.0, 0.1))
+def test_what_pushes_outwards_fades_over_the_margin(push, depth):
+    share = depth / MARGIN
+    left = stop([-push, 0.0], [-1.9 - depth, -2.0], [0.0, 0.0])[0]
+    assert_allclose(left, -push * (1 - share) + STIFFNESS * depth, rtol=0, atol=1e-9)
+
+
+@given(st.floats(0.0, 100.0), st.floats(0.0, 0.5))
+def test_what_pushes_inwards_is_left_and_helped(push, depth):
+    left = stop([push, 0.0], [-1.9 - depth, -2.0], [1.0, 0.0])[0]
+    spring = STIFFNESS * depth * max(depth / MARGIN, 1.0)
+    assert_allclose(left, push + spring, rtol=1e-9, atol=1e-9)
 
 
 def test_joint_stop_damps_motion_outwards_alone():
     """Half of the margin intruded: half of 30 N m s/rad, at 2 rad/s 30 N m, and none on the way back."""
-    assert_allclose(stop([-1.95, -0.15], [-2.0, 2.0]), [40.0, -40.0], rtol=1e-12)
-    assert_allclose(stop([-1.95, -0.15], [2.0, -2.0]), [10.0, -10.0], rtol=1e-12)
+    assert_allclose(stop([0, 0], [-1.95, -0.15], [-2.0, 2.0]), [40.0, -40.0], rtol=1e-9)
+    assert_allclose(stop([0, 0], [-1.95, -0.15], [2.0, -2.0]), [10.0, -10.0], rtol=1e-9)
 
 
-@given(st.floats(-0.5, 0.5), st.floats(-3, 3))
-def test_joint_stop_always_pushes_inwards(beyond, qd):
-    low, high = stop([-2.0 + beyond, -2.0], [qd, 0.0])[0], stop([2.0 - beyond, -2.0], [-qd, 0.0])[0]
-    assert low >= 0.0
-    assert high == -low
+@given(commands, st.floats(-1e-9, 1e-9))
+def test_nothing_jumps_where_the_stop_begins(tau, beyond):
+    assert_allclose(stop([tau, 0.0], [-1.9 - beyond, -2.0], [-3.0, 0.0])[0], tau, rtol=0, atol=1e-5)

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.control.plant import UNTOUCHED
 from tests.robot.worlds import OWN_SCENE, cell
 
 from contactsafe import Arm, Controller, Measurement, Pose, Target, presets, robots
@@ -49,7 +50,7 @@ class Run(NamedTuple):
     out: object
 
 
-def run(scene, ticks, *, q=None, offset=(0.0, 0.0, 0.0), push=None, until=None):
+def run(scene, ticks, *, q=None, offset=(0.0, 0.0, 0.0), push=None, until=None, wrench=UNTOUCHED):
     """Hold the pose at q moved by an offset, m; a force, N, pushes the forearm from tick 300 until a tick."""
     model, arm, forearm = scene
     q = arm.home if q is None else q
@@ -62,16 +63,17 @@ def run(scene, ticks, *, q=None, offset=(0.0, 0.0, 0.0), push=None, until=None):
     for k in range(ticks):
         if push is not None:
             data.xfrc_applied[model.body(forearm).id, :3] = push if 300 <= k < until else 0.0
-        out = controller.step(Measurement(data.qpos[at.qpos], data.qvel[at.dof]), target)
+        out = controller.step(Measurement(data.qpos[at.qpos], data.qvel[at.dof], wrench), target)
         data.ctrl[at.ctrl] = out.torque / at.gear
         mujoco.mj_step(model, data, at.steps)
         error[k], torque[k], link[k] = np.linalg.norm(out.error[:3]), out.torque, out.contact.link
     return Run(error, torque, link, out)
 
 
-def test_holds_a_pose(scene):
+@pytest.mark.parametrize("wrench", [UNTOUCHED, None], ids=["sensor", "no sensor"])
+def test_holds_a_pose(scene, wrench):
     """The tool stays where it is, loose fingers or not, and nothing is taken for a contact."""
-    seen = run(scene, 1000)
+    seen = run(scene, 1000, wrench=wrench)
     assert seen.error.max() < 5e-4
     assert not seen.link.any()
     assert seen.out.fault == "none"
@@ -84,8 +86,26 @@ def test_goes_where_it_is_told(scene):
     assert seen.out.fault == "none"
 
 
-@pytest.mark.parametrize("push", [(0.0, 25.0, 0.0), (0.0, 0.0, -25.0)], ids=["aside", "down"])
-def test_holds_the_tool_under_a_push_on_its_forearm(scene, push):
+UNDERRATED = pytest.mark.xfail(
+    strict=True,
+    reason="without a skin the lever arm is guessed too short (0.117 m for 0.24, 0.052 m for 0.11), so push_hold_n "
+    "bounds the hold below the pusher's own torque: the tool is carried 0.23 m (Panda) and 0.19 m (six joints) away",
+)
+
+
+@pytest.mark.parametrize(
+    ("make", "push"),
+    [
+        (fr3, (0.0, 25.0, 0.0)),
+        (fr3, (0.0, 0.0, -25.0)),
+        (panda_in_a_cell, (0.0, 25.0, 0.0)),
+        pytest.param(panda_in_a_cell, (0.0, 0.0, -25.0), marks=UNDERRATED),
+        pytest.param(six, (0.0, 25.0, 0.0), marks=UNDERRATED),
+        (six, (0.0, 0.0, -25.0)),
+    ],
+)
+def test_holds_the_tool_under_a_push_on_its_forearm(make, push):
+    scene = make()
     seen = run(scene, 2500, push=np.array(push), until=1300)
     assert np.isfinite(seen.torque).all()
     assert np.all(np.abs(seen.torque) <= scene.arm.tau_max)

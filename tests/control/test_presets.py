@@ -20,7 +20,12 @@ def test_paper_has_every_printed_parameter_and_nothing_beyond_it():
     assert config.cancel_tool_wrench
     for name in ("release_s", "recover_s", "null_damping", "contact_damping", "approach_damping"):
         assert getattr(config, name) == 0.0
-    assert config.push_yield_nm == config.push_hold_nm == math.inf
+    for name in ("friction_uncertainty", "inertia_uncertainty", "mass_uncertainty", "payload_uncertainty_kg"):
+        assert getattr(config, name) == 0.0
+    for name in ("push_yield_nm", "push_hold_nm", "push_yield_n", "push_hold_n", "push_tool_n", "tank_j"):
+        assert getattr(config, name) == math.inf
+    assert config.error_max_m == config.error_max_rad == math.inf
+    assert not config.passive_gains
 
 
 def test_baseline_differs_from_the_paper_in_being_blind_alone():
@@ -34,6 +39,7 @@ def test_safe_keeps_the_papers_posture_task_and_dwell():
     for name in ("K_pose", "D_pose", "dwell_s", "contact_aware", "stiffness_range", "damping_range", "dt"):
         assert getattr(safe, name) == getattr(paper, name)
     assert safe.push_yield_nm < safe.push_hold_nm < math.inf
+    assert safe.push_yield_n < safe.push_meet_n < safe.push_hold_n < math.inf
 
 
 @pytest.mark.parametrize("name", ["vices", "paper", "safe"])

@@ -1,7 +1,12 @@
 """What must hold of any arm's dynamics, whoever computes them."""
 
+import copy
+
+import mujoco
 import numpy as np
 from numpy.testing import assert_allclose
+
+from contactsafe.robot.dynamics import dynamics_dtype, mass_regressor, update_dynamics
 
 
 def test_inertia_is_symmetric_and_positive_definite(states):
@@ -72,8 +77,6 @@ def test_gravity_is_the_slope_of_potential_energy(states):
 
 
 def _potential(arm, q):
-    import mujoco
-
     data = mujoco.MjData(arm.model)
     data.qpos[:] = q
     mujoco.mj_kinematics(arm.model, data)
@@ -88,3 +91,23 @@ def test_dynamics_survive_the_end_of_the_model_they_were_asked_of(panda):
         panda.dynamics(panda.q_min, qd)
         assert panda.dynamics(q, qd) == first
         assert_allclose(panda.tool_pose(q).position, pose.position, rtol=0, atol=0)
+
+
+def test_mass_regressor_is_the_slope_of_gravity_torque_over_each_links_mass(states):
+    """Columns: links 1 to n, and last all that the last link carries as bodies of its own."""
+    for arm, q, _ in states[::5]:
+        nominal, out = arm.nominal(), np.zeros((arm.n, arm.n + 1))
+        update_dynamics(nominal.handle, q, np.zeros(arm.n), np.zeros(1, dtype=dynamics_dtype(arm.n))[0])
+        mass_regressor(nominal.handle, out)
+        first = int(arm.model.jnt_bodyid[0])
+        for column in range(arm.n + 1):
+            bodies = slice(first + column, first + column + 1 if column < arm.n else arm.model.nbody)
+            g = []
+            for sign in (1.0, -1.0):
+                model = copy.deepcopy(arm.model)
+                model.body_mass[bodies] *= 1.0 + sign * 1e-3
+                data = mujoco.MjData(model)
+                data.qpos[:] = q
+                mujoco.mj_forward(model, data)
+                g.append(data.qfrc_bias.copy())
+            assert_allclose(out[:, column], (g[0] - g[1]) / 2e-3, rtol=0, atol=1e-9)

@@ -8,8 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, aim, contact_wrench, panda, posture, run, worlds_at
 
 from contactsafe.control.tick import tick_at
-from contactsafe.sim.config import NO_NOISE, PlantConfig, SensorConfig, WorldConfig
+from contactsafe.errors import InvalidInputError
+from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, PlantConfig, SensorConfig, WorldConfig
 from contactsafe.sim.records import noise_channels
+from contactsafe.sim.scene import build_plant
 from contactsafe.sim.stepping import sense
 
 OVER, ON = (0.5, 0.0, BOARD_Z + 0.06), (0.5, 0.0, BOARD_Z + 0.0005)
@@ -102,8 +104,15 @@ def test_bias_is_drawn_at_reset_and_stays():
 
 @pytest.mark.parametrize(
     "plant",
-    [PlantConfig(friction_scale=3.0), PlantConfig(inertia_scale=1.5), PlantConfig(payload_kg=2.0)],
-    ids=["friction", "inertia", "payload"],
+    [
+        PlantConfig(friction_scale=3.0),
+        PlantConfig(friction_scale=(3.0, 1.0, 0.0, 1.0, 1.0, 2.0, 1.0)),
+        PlantConfig(inertia_scale=1.5),
+        PlantConfig(inertia_scale=(1.0, 1.0, 0.8, 1.2, 1.0, 1.0, 1.5)),
+        PlantConfig(payload_kg=2.0),
+        PlantConfig(payload_kg=-0.4),
+    ],
+    ids=["friction", "joints' friction", "inertia", "links' inertia", "payload", "lighter tool"],
 )
 def test_the_controllers_model_is_not_the_plant(plant):
     """The same measurement gives the same dynamics and the same torque, whatever the plant is made of."""
@@ -133,3 +142,136 @@ def test_once_sensed_the_plant_may_change_unseen():
         tick_at(worlds.controllers, 0)
         torques.append(worlds.controllers[0]["output"]["torque"].copy())
     assert_array_equal(*torques)
+
+
+def readings(worlds, ticks):
+    """Run tick by tick; give measured positions, measured velocities and the plant's before each tick."""
+    q, qd, true_q, true_qd = [], [], [], []
+    for _ in range(ticks):
+        true_q.append(worlds.datas[0].qpos[:7].copy())
+        true_qd.append(worlds.datas[0].qvel[:7].copy())
+        run(worlds, 1)
+        measured = worlds.controllers[0]["measurement"]
+        q.append(measured["q"].copy())
+        qd.append(measured["qd"].copy())
+    return tuple(map(np.array, (q, qd, true_q, true_qd)))
+
+
+def sweeping(sensors):
+    worlds = worlds_at(OVER, WorldConfig(sensors=sensors))
+    aim(worlds, (0.5, 0.15, BOARD_Z + 0.1))
+    return worlds
+
+
+@pytest.mark.parametrize("step", [1e-5, 2 * np.pi / 2**13])
+def test_encoders_give_whole_steps_and_the_nearest_one(step):
+    q, _, true_q, _ = readings(sweeping(replace(NO_NOISE, encoder_step_rad=step)), 400)
+    assert_allclose(q / step, np.round(q / step), rtol=0, atol=1e-6)
+    assert np.abs(q - true_q).max() <= 0.5 * step * (1 + 1e-9)
+    assert np.abs(q - true_q).max() > 0.4 * step
+
+
+def test_filtered_velocity_is_the_low_passed_difference_of_what_the_encoders_say():
+    """A first-order low-pass of the stated cut-off, at rest from the start."""
+    sensors = replace(NO_NOISE, encoder_step_rad=1e-4, velocity_filter_hz=50.0)
+    q, qd, *_ = readings(sweeping(sensors), 400)
+    share, expected = 1.0 - np.exp(-2 * np.pi * 50.0 * 0.001), np.zeros(7)
+    for k in range(1, 400):
+        expected = expected + share * ((q[k] - q[k - 1]) / 0.001 - expected)
+        assert_allclose(qd[k], expected, rtol=0, atol=1e-9)
+    assert_array_equal(qd[0], 0.0)
+    assert np.abs(qd).max() > 0.1
+
+
+def test_filtered_velocity_lags_by_its_time_constant_and_no_more():
+    """100 Hz: 1.1 ms; the plant moves by the speed it has at a tick's end. Once the first jerk is over."""
+    _, qd, _, true_qd = (seen[50:] for seen in readings(sweeping(replace(NO_NOISE, velocity_filter_hz=100.0)), 800))
+    assert np.abs(true_qd).max() > 0.2
+    errors = [np.std(qd[lag:] - true_qd[: len(qd) - lag]) for lag in range(5)]
+    assert np.argmin(errors) == 1
+    assert errors[1] < 0.3 * errors[0]
+
+
+def test_unfiltered_velocity_is_the_plants_own():
+    _, qd, _, true_qd = readings(sweeping(NO_NOISE), 100)
+    assert_array_equal(qd, true_qd)
+
+
+def test_reset_makes_filtered_velocity_start_at_rest():
+    worlds = sweeping(REAL_SENSORS)
+    run(worlds, 300)
+    assert np.abs(worlds.controllers[0]["measurement"]["qd"]).max() > 0.05
+    worlds.reset(0, posture(OVER))
+    run(worlds, 1)
+    assert_array_equal(worlds.controllers[0]["measurement"]["qd"], 0.0)
+
+
+def test_real_sensors_are_19_bit_encoders_and_a_low_pass():
+    assert REAL_SENSORS.encoder_step_rad == 2 * np.pi / 2**19
+    assert REAL_SENSORS.velocity_filter_hz == 100.0
+    assert REAL_SENSORS.force_n == SensorConfig().force_n
+
+
+def test_an_arm_with_real_sensors_reports_no_contact_while_it_moves_freely():
+    worlds = worlds_at(OVER, WorldConfig(sensors=REAL_SENSORS))
+    for goal in (0.12, -0.12):
+        aim(worlds, (0.5, goal, BOARD_Z + 0.1))
+        trace = run(worlds, 900)[0]
+        assert not trace["mode"].any()
+        assert np.linalg.norm(trace["error"][-1, :3]) < 0.01
+
+
+def test_one_scale_is_the_same_for_every_link_and_one_each_is_each_links_own():
+    nominal, scales = build_plant(panda(), WorldConfig()), (1.0, 0.9, 1.1, 1.2, 0.8, 1.05, 0.95)
+    one = build_plant(panda(), WorldConfig(plant=PlantConfig(inertia_scale=1.3)))
+    each = build_plant(panda(), WorldConfig(plant=PlantConfig(inertia_scale=scales)))
+    for k in range(1, 8):
+        for name in ("body_mass", "body_inertia"):
+            before, same, own = (getattr(m, name)[m.body(f"link{k}").id] for m in (nominal, one, each))
+            assert_allclose(same, 1.3 * before, rtol=1e-9)
+            assert_allclose(own, scales[k - 1] * before, rtol=1e-9)
+    for model in (one, each):
+        assert model.body("tool").mass == nominal.body("tool").mass
+
+
+def test_friction_of_each_joint_has_its_own_scale():
+    scales = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+    plain, scaled = (
+        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=s), sensors=NO_NOISE)).plants[0]["friction"]
+        for s in (1.0, scales)
+    )
+    assert_array_equal(plain, panda().friction)
+    assert_allclose(scaled[:, 0], np.array(scales) * plain[:, 0], rtol=1e-15)
+    assert_array_equal(scaled[:, 1:], plain[:, 1:])
+
+
+def test_a_lighter_tool_weighs_less_and_shows_so_at_the_wrist():
+    config = WorldConfig(sensors=NO_NOISE, plant=PlantConfig(payload_kg=-0.3))
+    worlds = worlds_at(OVER, config)
+    nominal = build_plant(panda(), WorldConfig())
+    assert_allclose(worlds.models[0].body("tool").mass, nominal.body("tool").mass - 0.3, rtol=1e-9)
+    trace = run(worlds, 2000)[0]
+    assert_allclose(trace["wrench_ee"][-1, :3], (0.0, 0.0, 0.3 * 9.81), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("plant", "text"),
+    [
+        ({"inertia_scale": (1.0, 1.1)}, "inertia_scale has 2 numbers; give one, or one for each of 7 joints"),
+        (
+            {"payload_kg": -0.83},
+            "payload_kg = -0.83 takes more than the 0.83 kg that tool 'franka hand with wiping pad' weighs; "
+            "give a larger one",
+        ),
+    ],
+)
+def test_plants_that_do_not_fit_the_arm_are_refused(plant, text):
+    with pytest.raises(InvalidInputError) as caught:
+        worlds_at(OVER, WorldConfig(plant=PlantConfig(**plant)))
+    assert str(caught.value) == text
+
+
+def test_friction_scales_that_do_not_fit_the_arm_are_refused():
+    with pytest.raises(InvalidInputError) as caught:
+        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=(1.0,) * 6)))
+    assert str(caught.value) == "friction_scale has 6 numbers; give one, or one for each of 7 joints"

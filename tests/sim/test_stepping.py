@@ -1,6 +1,7 @@
 """Native stepping is the loop that anybody would write with the public Python API, to the last bit."""
 
 import math
+from dataclasses import fields
 
 import mujoco
 import numpy as np
@@ -221,9 +222,19 @@ def test_configurations_that_do_not_fit_are_refused(configs, text):
     [
         ({"torque_delay_ticks": 2}, "torque_delay_ticks = 2; give 0 or 1"),
         (
-            {"payload_kg": -1.0},
-            "plant (friction × 1.0, inertia × 1.0, payload -1.0 kg) cannot exist; "
-            "friction_scale and payload_kg must be ≥ 0, inertia_scale > 0",
+            {"payload_kg": math.nan},
+            "plant (friction × 1.0, inertia × 1.0, payload nan kg) cannot exist; "
+            "friction_scale must be ≥ 0, inertia_scale > 0, payload_kg finite",
+        ),
+        (
+            {"friction_scale": (1.0, -0.1)},
+            "plant (friction × (1.0, -0.1), inertia × 1.0, payload 0.0 kg) cannot exist; "
+            "friction_scale must be ≥ 0, inertia_scale > 0, payload_kg finite",
+        ),
+        (
+            {"inertia_scale": 0.0},
+            "plant (friction × 1.0, inertia × 0.0, payload 0.0 kg) cannot exist; "
+            "friction_scale must be ≥ 0, inertia_scale > 0, payload_kg finite",
         ),
     ],
 )
@@ -247,7 +258,8 @@ def test_a_trace_that_is_too_short_is_refused():
 
 
 def test_sensors_of_zero_deviation_are_exact():
-    assert SensorConfig(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) == CALM.sensors
+    for field in fields(SensorConfig):
+        assert getattr(CALM.sensors, field.name) == (math.inf if field.name == "velocity_filter_hz" else 0.0)
     worlds = worlds_at(START)
     run(worlds, 1)
     before = worlds.datas[0].qpos.copy()

@@ -1,9 +1,12 @@
 """What the simulator says of contacts, for rewards, metrics and tests: forces and their torques on the arm."""
 
+import math
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import (
     BOARD_Z,
     CALM,
@@ -127,12 +130,88 @@ def test_what_hits_nothing_feels_nothing():
             {"radius": 0.0, "stiffness": 2e3},
             "obstacle radius = 0.0 m, stiffness = 2000.0 N/m; both must be greater than 0",
         ),
+        (
+            {"radius": 0.03, "stiffness": math.inf, "travel": (0.1, 0.0, 0.0)},
+            "obstacle travels (0.1, 0.0, 0.0) m in (0.0, 1.0) s with stiffness inf N/m; "
+            "give a finite stiffness, and a time of arrival after that of departure",
+        ),
+        (
+            {"radius": 0.03, "stiffness": 2e3, "travel": (0.1, 0.0, 0.0), "travel_s": (1.0, 1.0)},
+            "obstacle travels (0.1, 0.0, 0.0) m in (1.0, 1.0) s with stiffness 2000.0 N/m; "
+            "give a finite stiffness, and a time of arrival after that of departure",
+        ),
     ],
 )
 def test_obstacles_that_cannot_be_are_refused(fields, text):
     with pytest.raises(InvalidInputError) as caught:
         Obstacle((0.0, 0.0, 0.0), **fields)
     assert str(caught.value) == text
+
+
+def pole(place):
+    """Give a thing that cannot move."""
+    return Obstacle(place, radius=0.035, stiffness=math.inf, half_length=0.09)
+
+
+def test_a_fixed_obstacle_does_not_move_whatever_leans_on_it():
+    worlds, trace, obstacle = pressed(pole)
+    assert worlds.models[0].nv == 7
+    assert trace["obstacle_force"].max() > 20.0
+    assert_array_equal(trace["obstacle_position"][:, 0], np.broadcast_to(obstacle.position, (3000, 3)))
+    true = contact_torque(worlds.models[0], worlds.datas[0], "obstacle0")
+    assert_allclose(trace[-1]["tau_arm"], true, rtol=1e-6, atol=1e-6)
+
+
+FAR, ARRIVED = (0.0, 0.8, 0.5), (0.1, 0.75, 0.52)
+
+
+def travelling(travel=(0.1, -0.05, 0.02), travel_s=(0.2, 0.7)):
+    return Obstacle(FAR, radius=0.05, stiffness=2e4, damping_ratio=1.0, travel=travel, travel_s=travel_s)
+
+
+def test_an_obstacle_travels_its_way_in_its_time_and_stays_there():
+    """At constant speed; on its springs it comes to rest within 0.1 mm of where it is held."""
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(travelling(),)))
+    way = run(worlds, 1500)[0]["obstacle_position"][:, 0] - np.array(FAR)
+    assert_allclose(way[:200], 0.0, atol=1e-9)
+    assert_allclose(way[450], np.array((0.1, -0.05, 0.02)) / 2, atol=0.004)
+    assert_allclose(way[-1], (0.1, -0.05, 0.02), atol=1e-4)
+    assert np.abs(np.diff(way, axis=0)).max() < 0.1 / 500 * 1.05
+
+
+def test_reset_puts_a_travelling_obstacle_back():
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(travelling(),)))
+    first = run(worlds, 900)[0]["obstacle_position"].copy()
+    worlds.reset(0, posture(OVER))
+    assert_array_equal(run(worlds, 900)[0]["obstacle_position"], first)
+
+
+def test_worlds_of_one_configuration_do_not_share_what_travels():
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(travelling(),)), n=2)
+    run(worlds, 900)
+    worlds.reset(0, posture(OVER))
+    trace = run(worlds, 17)
+    assert_allclose(trace["obstacle_position"][0, -1, 0], FAR, atol=1e-9)
+    assert_allclose(trace["obstacle_position"][1, -1, 0], ARRIVED, atol=1e-3)
+    worlds.close()
+
+
+def test_a_travelling_obstacle_beside_one_that_stays_moves_alone():
+    beside = Obstacle((0.0, -0.8, 0.5), radius=0.05, stiffness=2e3)
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(beside, travelling())))
+    last = run(worlds, 1500)[0]["obstacle_position"][-1]
+    assert_allclose(last[0], beside.position, atol=1e-9)
+    assert_allclose(last[1], ARRIVED, atol=1e-4)
+
+
+def test_an_obstacle_that_travels_into_the_arm_pushes_it():
+    resting = beside_forearm(bottle, y=0.0)
+    away = np.array(resting.position) - (0.0, 0.03, 0.0)
+    thing = replace(resting, position=tuple(away), travel=(0.0, 0.05, 0.0), travel_s=(0.1, 0.6))
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(thing,)), "vices")
+    trace = run(worlds, 1500)[0]
+    assert trace["obstacle_force"][:100].max() == 0.0
+    assert trace["obstacle_force"][-1] > 5.0
 
 
 def test_a_world_has_room_for_four_obstacles():

@@ -1,0 +1,158 @@
+"""Gains change no faster than keeps the impedance passive, and the command gives no more energy than it may."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
+from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
+from tests.control.targets import hostile_target
+
+from contactsafe import Measurement, Pose, Target, presets
+from contactsafe.control.laws import passive_step, power_limit
+
+SAFE = replace(presets.safe(), friction_compensation=False)
+ALPHA, DT = 2.0, 0.001
+stiffnesses = arrays(float, 6, elements=st.floats(10.0, 1500.0))
+dampings = arrays(float, 6, elements=st.floats(ALPHA, 120.0))
+
+
+@given(stiffnesses, dampings, stiffnesses, dampings)
+def test_gains_obey_the_inequality_of_passivity_whatever_is_asked(K, D, K_wanted, D_wanted):
+    """K̇ + α Ḋ ≤ 2 α K on every axis, and never past what is asked."""
+    K0, D0 = K.copy(), D.copy()
+    passive_step(K, D, K_wanted, D_wanted, DT, ALPHA, True)
+    assert ((K - K0) / DT + ALPHA * (D - D0) / DT <= 2.0 * ALPHA * K0 * (1 + 1e-9) + 1e-6).all()
+    for now, before, wanted in ((K, K0, K_wanted), (D, D0, D_wanted)):
+        assert (now >= np.minimum(before, wanted) - 1e-9).all()
+        assert (now <= np.maximum(before, wanted) + 1e-9).all()
+
+
+@settings(max_examples=25)
+@given(stiffnesses, dampings, stiffnesses, dampings)
+def test_gains_reach_what_is_asked(K, D, K_wanted, D_wanted):
+    """From 10 to 1500 1/s² in less than 3 s, whatever else changes."""
+    for _ in range(3000):
+        passive_step(K, D, K_wanted, D_wanted, DT, ALPHA, True)
+    assert_allclose(K, K_wanted, rtol=1e-9)
+    assert_allclose(D, D_wanted, rtol=1e-9)
+
+
+@given(stiffnesses, dampings, st.floats(0.1, 1.0), st.floats(0.1, 1.0))
+def test_falling_gains_fall_at_once(K, D, share_K, share_D):
+    K_wanted, D_wanted = share_K * K, share_D * D
+    passive_step(K, D, K_wanted, D_wanted, DT, ALPHA, True)
+    assert_allclose(K, K_wanted, rtol=1e-12)
+    assert_allclose(D, D_wanted, rtol=1e-12)
+
+
+@given(stiffnesses, dampings, stiffnesses, dampings)
+def test_gains_follow_at_once_where_they_are_not_limited(K, D, K_wanted, D_wanted):
+    passive_step(K, D, K_wanted, D_wanted, DT, ALPHA, False)
+    assert_allclose(K, K_wanted, rtol=1e-12)
+    assert_allclose(D, D_wanted, rtol=1e-12)
+
+
+torques = arrays(float, 7, elements=st.floats(-200.0, 200.0))
+speeds = arrays(float, 7, elements=st.floats(-3.0, 3.0))
+
+
+@given(torques, speeds, st.floats(-5.0, 10.0), st.floats(0.0, 50.0))
+def test_no_more_power_than_the_tank_can_pay(tau, qd, tank, power):
+    """What is taken off is the least that does it: along q̇."""
+    asked, allowed = tau.copy(), power + max(tank, 0.0) / 0.1
+    power_limit(tau, qd, tank, power, 0.1)
+    if asked @ qd <= allowed:
+        assert_array_equal(tau, asked)
+    else:
+        assert_allclose(tau @ qd, allowed, rtol=1e-6, atol=1e-6)
+        off = asked - tau
+        assert_allclose(off, qd * (off @ qd) / (qd @ qd), rtol=1e-6, atol=1e-6)
+
+
+def energy_over_tank(arm, every, seed, ticks=4000):
+    """Let a hostile policy drive; give by how much the energy given over any window exceeded tank + power × time, J."""
+    rng, plant, controller = np.random.default_rng(seed), Plant(arm), controller_at(arm, SAFE)
+    level, lowest, worst = 0.0, 0.0, 0.0
+    for k in range(ticks):
+        if k % every == 0:
+            target = hostile_target(arm, rng)
+        out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
+        net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
+        plant.step(out.torque)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        lowest = min(lowest, level)
+        worst = max(worst, level - lowest)
+    return worst - SAFE.tank_j
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_command_gives_no_more_energy_than_the_tank_and_its_power(quick_panda, seed):
+    """An arm that takes any torque at once, targets that change at the policy's rate."""
+    assert energy_over_tank(quick_panda, 17, seed) < 0.25
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="power is limited without the Coriolis torque, but the tank pays for it: at 1 to 5 rad/s it is overdrawn "
+    "by up to 8.8 J, and a tank below zero is not brought back",
+)
+def test_command_gives_no_more_energy_than_the_tank_at_speed(quick_panda):
+    assert energy_over_tank(quick_panda, 170, seed=1, ticks=8000) < 0.25
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="at 1000 N m/s the command cannot follow what the energy limit asks: the loop swings by itself and gives "
+    "20 J (targets of 17 ms) to 800 J (of 170 ms) more than the tank and 10 W allow",
+)
+@pytest.mark.parametrize("every", [17, 170])
+def test_command_gives_no_more_energy_than_the_tank_at_the_torque_rate_limit(panda, every):
+    assert energy_over_tank(panda, every, seed=1) < 5.0
+
+
+def swept(arm, K, ticks=4000):
+    """Lead the tool by up to 5 cm an axis at critical damping; give the greatest energy of any window, J, and speed."""
+    rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
+    home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
+    for k in range(ticks):
+        if k % 340 == 0:
+            way = np.clip(rng.normal(size=3) * 0.3, -0.05, 0.05)
+        if k % 17 == 0:
+            position = np.clip(plant.tool_position() + way, home.position - 0.15, home.position + 0.15)
+            target = Target(Pose(position, home.quat), np.full(6, K), posture=arm.home)
+        out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
+        net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
+        plant.step(out.torque)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        lowest, speed = min(lowest, level), max(speed, np.abs(plant.qd / arm.qd_max).max())
+        worst = max(worst, level - lowest)
+    return worst, speed
+
+
+def test_a_task_well_done_needs_little_of_the_tank(panda):
+    """At 150 1/s²: 0.4 J, and every joint within its speed limit."""
+    worst, speed = swept(panda, 150.0)
+    assert worst < 1.0
+    assert speed < 1.0
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="with the stiffest gains allowed the torque-rate limit makes the loop swing by itself: 159 J beyond the "
+    "tank's power, joints at 9.7 times their speed limit (2.3 times, 5 J, with motors that take any torque at once)",
+)
+def test_loop_does_not_swing_by_itself_at_the_stiffest_gains_allowed(panda):
+    worst, speed = swept(panda, SAFE.stiffness_range[1], ticks=8000)
+    assert speed < 2.5
+    assert worst < 2 * SAFE.tank_j
+
+
+def test_tank_that_is_full_changes_nothing(panda):
+    """At rest nothing is given, so the tank stays full."""
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 500, UNTOUCHED)
+    assert controller.record["state"]["tank_j"] == SAFE.tank_j

@@ -1,0 +1,153 @@
+"""The links are weighed while nothing touches the arm; what is learned comes off the residual and the threshold."""
+
+import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach
+
+from contactsafe import presets
+from contactsafe.control.laws import weigh
+from contactsafe.robot.dynamics import dynamics_dtype, mass_regressor, update_dynamics
+
+SAFE = replace(presets.safe(), friction_compensation=False)
+WAY = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
+
+
+def psd(A):
+    return np.linalg.eigvalsh(0.5 * (A + A.T))[0] > -1e-12 * max(np.abs(A).max(), 1.0)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8))
+def test_readings_only_ever_narrow_what_is_believed(seed, m):
+    """P_before − P_after and P_after are positive semi-definite whatever is read."""
+    rng = np.random.default_rng(seed)
+    error, P = np.zeros(m), np.diag(rng.uniform(1e-4, 1.0, m))
+    for _ in range(30):
+        before = P.copy()
+        weigh(error, P, rng.normal(size=m) * 10.0 ** rng.uniform(-2, 2), rng.normal() * 5.0, rng.uniform(0.01, 2.0))
+        assert psd(P)
+        assert psd(before - P)
+        assert np.isfinite(error).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_masses_are_found_from_readings_of_an_arm_at_rest(seed):
+    rng = np.random.default_rng(seed)
+    truth, error, P = rng.uniform(-0.1, 0.1, 8), np.zeros(8), 0.01 * np.eye(8)
+    for _ in range(400):
+        row = rng.normal(size=8) * 5.0
+        weigh(error, P, row, row @ (truth - error), 0.01)
+    assert_allclose(error, truth, rtol=0, atol=2e-3)
+
+
+def test_gravity_of_an_arm_is_found_from_a_few_postures(panda):
+    """Not every link's mass shows by itself in joint torques; what they come to at other postures does."""
+    rng, nominal = np.random.default_rng(2), panda.nominal()
+    truth, error, P = rng.choice([-0.1, 0.1], 8), np.zeros(8), 0.01 * np.eye(8)
+
+    def regressor():
+        rows = np.zeros((7, 8))
+        q = rng.uniform(panda.q_min, panda.q_max)
+        update_dynamics(nominal.handle, q, np.zeros(7), np.zeros(1, dtype=dynamics_dtype(7))[0])
+        mass_regressor(nominal.handle, rows)
+        return rows
+
+    for _ in range(60):
+        for row in regressor():
+            weigh(error, P, row, row @ (truth - error), 0.01)
+    rows = np.concatenate([regressor() for _ in range(50)])
+    assert np.abs(rows @ truth).max() > 1.0
+    assert np.abs(rows @ (truth - error)).max() < 0.05 * np.abs(rows @ truth).max()
+
+
+def heavier(arm, scale):
+    """Give the arm's model with the masses and inertias of its links scaled, the tool's left."""
+    model = copy.deepcopy(arm.model)
+    links = slice(int(model.jnt_bodyid[0]), int(model.jnt_bodyid[0]) + arm.n)
+    model.body_mass[links] *= scale
+    model.body_inertia[links] *= scale
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def moved(arm, config, model=None):
+    """Move about for 2 s; give the controller, its plant, the mean residual of the last 0.25 s and contact ticks."""
+    plant, controller, seen, contacts = Plant(arm, model=model), controller_at(arm, config), [], 0
+    for offset in WAY:
+        target = reach(arm, offset)
+        for _ in range(500):
+            out = plant.run(controller, target, 1, UNTOUCHED)
+            seen.append(out.residual)
+            contacts += out.contact.in_contact
+    return controller, plant, np.mean(seen[-250:], axis=0), contacts
+
+
+@pytest.mark.parametrize("scale", [1.1, 0.9])
+def test_links_that_weigh_ten_percent_more_or_less_do_not_show_after_two_seconds(panda, scale):
+    """Bias of the residual 0.40 N m or less; 2.0 N m and more where the model is trusted, which sees contacts."""
+    *_, weighed, contacts = moved(panda, SAFE, heavier(panda, scale))
+    *_, trusted, mistaken = moved(panda, replace(SAFE, mass_uncertainty=0.0), heavier(panda, scale))
+    assert np.abs(weighed).max() < 0.5
+    assert np.abs(trusted).max() > 1.5
+    assert contacts == 0
+    assert mistaken > 1000
+
+
+def test_arm_as_modelled_is_found_to_weigh_what_its_model_says(panda):
+    controller, *_ = moved(panda, SAFE)
+    assert np.abs(controller.record["state"]["mass_error"]).max() < 0.01
+
+
+def test_threshold_falls_as_the_weight_becomes_known(panda):
+    """From the share of the unknown weight down to δ and little more, at rest in the posture it was found in."""
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 1, UNTOUCHED)
+    first = controller.record["state"]["threshold"].copy()
+    plant.run(controller, hold(panda), 2000, UNTOUCHED)
+    last = controller.record["state"]["threshold"]
+    assert first.max() > SAFE.residual_threshold + 1.5
+    assert (last <= first + 1e-12).all()
+    assert last.max() < SAFE.residual_threshold + 0.5
+
+
+def test_nothing_is_learned_in_contact(panda):
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 500, UNTOUCHED)
+    plant.push("link5", (0.0, 25.0, 0.0))
+    while not plant.run(controller, hold(panda), 1, UNTOUCHED).contact.in_contact:
+        pass
+    before = controller.record["state"]["mass_error"].copy()
+    out = plant.run(controller, hold(panda), 1000, UNTOUCHED)
+    assert out.contact.in_contact
+    assert_array_equal(controller.record["state"]["mass_error"], before)
+
+
+def test_nothing_is_learned_where_a_hand_could_hold_the_tool_unseen(panda):
+    """Without a force sensor what hangs on the tool would be taken for weight of the links."""
+    plant, controller = Plant(panda, model=heavier(panda, 1.1)), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 1000)
+    assert not controller.record["state"]["mass_error"].any()
+
+
+def test_model_that_is_trusted_is_not_weighed(panda):
+    controller, *_ = moved(panda, presets.paper(), heavier(panda, 1.05))
+    assert not controller.record["state"]["mass_error"].any()
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="what stays below the threshold is learned without bound: under 25 N on link 4 that lasts 5 s, link 4 is "
+    "believed to weigh 67 % more, eleven standard deviations, and letting go shows as a contact of 2.7 s",
+)
+def test_lasting_push_below_the_threshold_is_not_taken_for_a_weight_that_cannot_be(panda):
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 300, UNTOUCHED)
+    plant.push("link4", (0.0, 0.0, -25.0))
+    plant.run(controller, hold(panda), 5000, UNTOUCHED)
+    assert np.abs(controller.record["state"]["mass_error"]).max() < 5 * SAFE.mass_uncertainty

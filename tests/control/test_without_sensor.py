@@ -1,0 +1,103 @@
+"""Without a force sensor the null space tells tool from arm: what a tool feels never shows there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.control.plant import Plant, controller_at, hold, reach, wrist_meets_sphere
+
+from contactsafe import Measurement, presets
+
+SAFE = replace(presets.safe(), friction_compensation=False)
+
+
+def wipe(arm, force, config=SAFE, ticks=2000):
+    """Wipe in a figure of eight, a board's reaction at the tool, 0.3 of it against the motion; yield the outputs."""
+    plant, controller = Plant(arm), controller_at(arm, config)
+    for k in range(ticks):
+        if k % 17 == 0:
+            t = 2 * np.pi * k / 1000
+            target = reach(arm, [0.05 * np.sin(t / 2), 0.08 * np.sin(t), 0.0])
+        out = controller.step(Measurement(plant.q, plant.qd), target)
+        J, wrench = controller.record["dynamics"]["J"], np.zeros(6)
+        velocity = (J @ plant.qd)[:2]
+        wrench[2] = force * min(1.0, k / 50)
+        wrench[:2] = -0.3 * wrench[2] * velocity / max(np.linalg.norm(velocity), 0.01)
+        plant.step(out.torque + J.T @ wrench)
+        yield out, controller
+
+
+@pytest.mark.parametrize("force", [8.0, 20.0, 40.0])
+def test_board_under_the_tool_is_no_contact_of_the_arm(panda, force):
+    """Torques of the tool of 4 N m and more; what is held against the threshold is 0.05 N m."""
+    felt, alarm = 0.0, 0.0
+    for out, controller in wipe(panda, force):
+        assert not out.contact.in_contact
+        felt = max(felt, np.abs(out.contact.torque).max())
+        alarm = max(alarm, np.abs(controller.record["state"]["alarm"]).max())
+    assert felt > 0.2 * force
+    assert alarm < 0.05
+
+
+def test_board_under_the_tool_is_a_contact_to_the_paper(panda):
+    """Its residual is not told apart where the sensor's wrench is not to be cancelled."""
+    config = replace(SAFE, cancel_tool_wrench=False)
+    assert any(out.contact.in_contact for out, _ in wipe(panda, 20.0, config, 500))
+
+
+@pytest.mark.parametrize("force", [(0.0, 25.0, 0.0), (0.0, -25.0, 0.0)])
+def test_contact_with_a_share_in_the_null_space_is_one_of_the_arm_and_held_against(panda, force):
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 100)
+    before = plant.tool_position()
+    plant.push("link4", force)
+    out = plant.run(controller, hold(panda), 1500)
+    assert out.contact.in_contact
+    assert out.contact.holding
+    assert np.linalg.norm(plant.tool_position() - before) < 0.010
+
+
+def test_contact_of_the_arm_is_found_while_the_tool_wipes(panda):
+    """What the board exerts is remembered as the tool's and not taken for the arm's contact."""
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    still, wrench = hold(panda), np.array([0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
+    for k in range(1500):
+        if k == 700:
+            plant.push("link4", (0.0, 30.0, 0.0))
+        out = controller.step(Measurement(plant.q, plant.qd), still)
+        J = controller.record["dynamics"]["J"].copy()
+        plant.step(out.torque + J.T @ wrench)
+        assert k >= 700 or not out.contact.in_contact
+        if k == 730:
+            torque = controller.record["state"]["arm_torque_trigger"].copy()
+            truth = plant.push_torque()
+    assert out.contact.in_contact
+    assert np.linalg.norm(torque - truth) < 0.35 * np.linalg.norm(truth)
+
+
+BLIND = pytest.mark.xfail(
+    strict=True,
+    reason="what a contact does in task directions counts as the tool's: a push with little share in the null space is "
+    "never found. 25 N on link 6 carry the tool 149 mm in 3 s (10.7 mm with a sensor); a wrist against an obstacle "
+    "presses 24 N for good (6.7 N with one)",
+)
+
+
+@BLIND
+@pytest.mark.parametrize(("body", "force"), [("link5", (0.0, 0.0, -25.0)), ("link6", (0.0, 0.0, -25.0))])
+def test_lasting_push_anywhere_on_the_arm_is_held_against(panda, body, force):
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    before = plant.tool_position()
+    plant.push(body, force)
+    plant.run(controller, hold(panda), 3000)
+    assert np.linalg.norm(plant.tool_position() - before) < 0.015
+
+
+@BLIND
+def test_obstacle_before_the_wrist_is_yielded_to(panda):
+    plant = wrist_meets_sphere(panda, 0.04, 2000.0)
+    controller, start = controller_at(panda, SAFE), plant.tool_position()[1]
+    for k in range(120):
+        ahead = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
+        plant.run(controller, reach(panda, [0.0, ahead, 0.0]), 17)
+    assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < 3 * SAFE.push_yield_n

@@ -1,0 +1,134 @@
+"""Points of an arm's skin, and finding on it where something touches."""
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from contactsafe.robot.contact import best_point, contact_lever, skin_torque
+from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
+
+
+class Placed:
+    """An arm's nominal model at a posture, and the same through MuJoCo's public API."""
+
+    def __init__(self, arm, q):
+        self.arm, self.nominal = arm, arm.nominal()
+        self.handle = self.nominal.handle
+        update_dynamics(self.handle, q, np.zeros(arm.n), np.zeros(1, dtype=dynamics_dtype(arm.n))[0])
+        self.data = mujoco.MjData(arm.model)
+        self.data.qpos[:] = q
+        mujoco.mj_kinematics(arm.model, self.data)
+        mujoco.mj_comPos(arm.model, self.data)
+
+    def torque(self, link, point, push):
+        """Give J_pᵀ F of a force at a point of a link, both in the link's frame, (n,)."""
+        body, J = int(self.arm.model.jnt_bodyid[link - 1]), np.zeros((3, self.arm.n))
+        R = self.data.xmat[body].reshape(3, 3)
+        mujoco.mj_jac(self.arm.model, self.data, J, None, self.data.xpos[body] + R @ point, body)
+        return J.T @ R @ push
+
+    def search(self, torque):
+        """Give the link found for a contact torque, and the lever arm there, m."""
+        scratch = np.zeros(self.arm.n)
+        best, _ = best_point(self.handle, 0, len(self.arm.skin), torque, scratch, -1, 0.0)
+        return skin_torque(self.handle, best, scratch), np.linalg.norm(scratch)
+
+
+def random_contact(arm, rng):
+    """Give a link from 4 on, a point of one of its capsules' sides, and the normal there, in the link's frame."""
+    link = int(rng.integers(4, arm.n + 1))
+    capsules = arm.facts.links[link - 1].capsules
+    capsule = capsules[rng.integers(len(capsules))]
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    axis = (end - start) / np.linalg.norm(end - start)
+    normal = rng.normal(size=3)
+    normal -= axis * (normal @ axis)
+    normal /= np.linalg.norm(normal)
+    return link, start + rng.random() * (end - start) + capsule.radius * normal, normal
+
+
+def test_skin_lies_on_the_capsules_with_unit_normals_outwards(arms):
+    """A point less its normal times the capsule's radius lies on the axis, between the ends, square to it."""
+    for arm in arms:
+        assert len(arm.skin) > 0
+        for link, *numbers in arm.skin:
+            point, normal = np.array(numbers[:3]), np.array(numbers[3:])
+            assert_allclose(np.linalg.norm(normal), 1.0, rtol=0, atol=1e-12)
+            assert any(_on_side(capsule, point, normal) for capsule in arm.facts.links[int(link) - 1].capsules)
+
+
+def _on_side(capsule, point, normal):
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    axis, foot = end - start, point - capsule.radius * normal - start
+    along = (foot @ axis) / (axis @ axis)
+    return np.linalg.norm(foot - along * axis) < 1e-12 and -1e-12 < along < 1 + 1e-12 and abs(normal @ axis) < 1e-12
+
+
+def test_every_capsule_but_the_first_links_has_skin(arms):
+    for arm in arms:
+        sampled = {int(link) for link in arm.skin[:, 0]}
+        assert sampled == {k for k in range(2, arm.n + 1) if arm.facts.links[k - 1].capsules}
+
+
+def test_torque_of_a_push_on_the_skin_is_its_jacobian_transposed(states):
+    for arm, q, _ in states[::4]:
+        placed, tau = Placed(arm, q), np.zeros(arm.n)
+        for index in range(0, len(arm.skin), 7):
+            row = arm.skin[index]
+            link = skin_torque(placed.handle, index, tau)
+            assert link == int(row[0])
+            assert_allclose(tau, placed.torque(link, row[1:4], -row[4:]), rtol=0, atol=1e-9)
+
+
+def test_search_in_parts_is_the_search_at_once(panda):
+    """Whatever point has won is better than or equal to every other."""
+    placed, rng = Placed(panda, panda.home), np.random.default_rng(0)
+    for _ in range(20):
+        torque, scratch = rng.normal(size=7), np.zeros(7)
+        whole = best_point(placed.handle, 0, 480, torque, scratch, -1, 0.0)
+        best, fit = -1, 0.0
+        for start in range(0, 480, 60):
+            best, fit = best_point(placed.handle, start, start + 60, torque, scratch, best, fit)
+        assert (best, fit) == whole
+        for index in range(480):
+            skin_torque(placed.handle, index, scratch)
+            size = np.linalg.norm(scratch) * np.linalg.norm(torque)
+            assert size == 0.0 or scratch @ torque / size <= fit + 1e-12
+
+
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_random_contacts_are_found_where_they_are(request, name):
+    """Without noise, links 4 to 7, 500 postures: 80 % on the very link and 93 % there or next to it, measured.
+
+    Some contacts cannot be told apart: the same joint torques fit two points. The lever arm, which the bounds rest
+    on, is right to within a factor of two in 95 %. The FR3: 80 %, 92 %, 95 %.
+    """
+    arm, rng = request.getfixturevalue(name), np.random.default_rng(0)
+    right, near, lever = [], [], []
+    for _ in range(500):
+        placed = Placed(arm, rng.uniform(arm.q_min, arm.q_max))
+        link, point, normal = random_contact(arm, rng)
+        torque = placed.torque(link, point, -normal)
+        found, length = placed.search(20.0 * torque)
+        right.append(found == link)
+        near.append(abs(found - link) <= 1)
+        lever.append(0.5 < length / np.linalg.norm(torque) < 2.0)
+    assert np.mean(right) > 0.70
+    assert np.mean(near) > 0.88
+    assert np.mean(lever) > 0.85
+
+
+def test_lever_guessed_from_the_link_is_that_of_its_centre_where_the_push_is_there(panda):
+    """Joint torque of a force at a link's centre of mass, square to what moves it not at all: |τ| / F to 5 %."""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        q = rng.uniform(panda.q_min, panda.q_max)
+        placed = Placed(panda, q)
+        link = int(rng.integers(4, 8))
+        body, J = panda.model.body(f"link{link}").id, np.zeros((3, 7))
+        mujoco.mj_jacBodyCom(panda.model, placed.data, J, None, body)
+        force = np.linalg.svd(J)[0][:, 0]  # the way in which the link moves most
+        torque = J.T @ force
+        lever = contact_lever(placed.handle, link, torque / np.linalg.norm(torque))
+        assert_allclose(lever, np.linalg.norm(torque), rtol=0.05)
