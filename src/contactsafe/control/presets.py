@@ -36,9 +36,9 @@ def safe() -> ControllerConfig:
     return replace(
         paper(),
         observer_gain=50.0,
-        trigger_gain=100.0,
-        residual_cutoff_hz=200.0,
-        residual_threshold=1.75,
+        trigger_gain=250.0,
+        residual_cutoff_hz=40.0,
+        residual_threshold=1.5,
         friction_uncertainty=0.3,
         inertia_uncertainty=0.15,
         mass_uncertainty=0.06,

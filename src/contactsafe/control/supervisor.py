@@ -10,7 +10,7 @@ from contactsafe.control.records import CONTACT, FREE
 from contactsafe.robot.contact import best_point, contact_lever, skin_torque
 from contactsafe.robot.linalg import dot
 
-_POINTS_A_TICK = 60
+_POINTS_A_TICK = 20
 """Points of the skin that are searched for the contact in one tick."""
 
 _LEAST_LEVER = 0.03
