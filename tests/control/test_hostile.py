@@ -80,7 +80,7 @@ def test_any_state_gives_a_finite_torque_within_its_limits(panda, seed):
 @pytest.mark.xfail(
     strict=True,
     reason="the first tick starts from g − Cᵀ q̇ as measured, unlimited, and the rate limit keeps it there: at 25 "
-    "rad/s, one spurious reading, joint 6 is sent 116 N m where 12 are allowed",
+    "rad/s, one spurious reading, a joint is sent 25 times the torque it is allowed",
 )
 def test_first_measurement_at_speed_gives_a_torque_within_its_limits(panda):
     rng = np.random.default_rng(3)

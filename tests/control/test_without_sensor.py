@@ -78,8 +78,8 @@ def test_contact_of_the_arm_is_found_while_the_tool_wipes(panda):
 BLIND = pytest.mark.xfail(
     strict=True,
     reason="what a contact does in task directions counts as the tool's: a push with little share in the null space is "
-    "never found. 25 N on link 6 carry the tool 149 mm in 3 s (10.7 mm with a sensor); a wrist against an obstacle "
-    "presses 24 N for good (6.7 N with one)",
+    "never found. 25 N on link 6 carry the tool 149 mm in 3 s (5.0 mm with a sensor); a wrist against an obstacle "
+    "presses 24 N for good (3.8 N with one)",
 )
 
 
