@@ -248,6 +248,19 @@ def weigh(mass_error, covariance, row, torque, variance):
 
 
 @compiled
+def passes_elsewhere(wrench, radius, margin):
+    """Tell whether a wrench at the tool point cannot come from a touch of the tool: its line passes elsewhere.
+
+    Args:
+        wrench: about the tool point, (6,), N and N m.
+        radius: of the tool about that point, m.
+        margin: moment that noise may show, N m.
+    """
+    force, moment = wrench[:3], wrench[3:]
+    return math.sqrt(dot(moment, moment)) > radius * math.sqrt(dot(force, force)) + margin
+
+
+@compiled
 def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
