@@ -47,7 +47,6 @@ def test_every_fault_has_a_row(tables):
         assert f"| {number} | {text} |" in tables.faults()
 
 
-@pytest.mark.xfail(strict=True, reason="the page still describes how work told pusher from obstacle")
 def test_page_names_no_parameter_that_is_not_there():
     known = {field.name for field in fields(ControllerConfig)} | {"fault", "control_tick", "reset"}
     known |= {name for module in (laws, estimate, supervisor) for name in vars(module)}

@@ -89,33 +89,20 @@ def energy_over_tank(arm, every, seed, ticks=4000):
     return worst - SAFE.tank_j
 
 
+@pytest.mark.parametrize("every", [17, 50, 170])
 @pytest.mark.parametrize("seed", range(3))
-def test_command_gives_no_more_energy_than_the_tank_and_its_power(quick_panda, seed):
-    """An arm that takes any torque at once, targets that change at the policy's rate."""
-    assert energy_over_tank(quick_panda, 17, seed) < 0.25
+def test_command_gives_no_more_energy_than_the_tank_and_its_power(panda, every, seed):
+    """Over any window; the torque rate may delay what the limit asks: 0.5 J more, measured over 32 runs of 8 s."""
+    assert energy_over_tank(panda, every, seed) < 1.0
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="power is limited without the Coriolis torque, but the tank pays for it: at 1 to 5 rad/s it is overdrawn "
-    "by up to 8.8 J, and a tank below zero is not brought back",
-)
-def test_command_gives_no_more_energy_than_the_tank_at_speed(quick_panda):
-    assert energy_over_tank(quick_panda, 170, seed=1, ticks=8000) < 0.25
-
-
-@pytest.mark.xfail(
-    strict=True,
-    reason="at 1000 N m/s the command cannot follow what the energy limit asks: the loop swings by itself and gives "
-    "20 J (targets of 17 ms) to 800 J (of 170 ms) more than the tank and 10 W allow",
-)
-@pytest.mark.parametrize("every", [17, 170])
-def test_command_gives_no_more_energy_than_the_tank_at_the_torque_rate_limit(panda, every):
-    assert energy_over_tank(panda, every, seed=1) < 5.0
+@pytest.mark.parametrize("seed", range(3))
+def test_command_gives_no_more_energy_than_the_tank_where_motors_take_any_torque(quick_panda, seed):
+    assert energy_over_tank(quick_panda, 17, seed) < 0.0
 
 
 def swept(arm, K, ticks=4000):
-    """Lead the tool by up to 5 cm an axis at critical damping; give the greatest energy of any window, J, and speed."""
+    """Lead the tool 5 cm ahead, critically damped; give the greatest energy of a window, J, and share of speed limit."""
     rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):
@@ -133,22 +120,12 @@ def swept(arm, K, ticks=4000):
     return worst, speed
 
 
-def test_a_task_well_done_needs_little_of_the_tank(panda):
-    """At 150 1/s²: 0.4 J, and every joint within its speed limit."""
-    worst, speed = swept(panda, 150.0)
+@pytest.mark.parametrize("K", [150.0, 1500.0])
+def test_a_task_well_done_needs_little_of_the_tank(panda, K):
+    """At the default's gains and at the stiffest allowed, where the torque rate once made the loop swing by itself."""
+    worst, speed = swept(panda, K)
     assert worst < 1.0
     assert speed < 1.0
-
-
-@pytest.mark.xfail(
-    strict=True,
-    reason="with the stiffest gains allowed the torque-rate limit makes the loop swing by itself: 159 J beyond the "
-    "tank's power, joints at 9.7 times their speed limit (2.3 times, 5 J, with motors that take any torque at once)",
-)
-def test_loop_does_not_swing_by_itself_at_the_stiffest_gains_allowed(panda):
-    worst, speed = swept(panda, SAFE.stiffness_range[1], ticks=8000)
-    assert speed < 2.5
-    assert worst < 2 * SAFE.tank_j
 
 
 def test_tank_that_is_full_changes_nothing(panda):

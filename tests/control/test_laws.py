@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from contactsafe.control.laws import (
-    clip_error,
     contact_nullspace,
     damping_wrench,
     push_along,
+    shorten,
     stiffness_wrench,
     task_error,
     task_inertia,
@@ -128,7 +128,7 @@ def test_impedance_gives_each_axis_its_own_acceleration():
     """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), the pull and the damping apart."""
     K, D = np.arange(10.0, 16.0), np.arange(1.0, 7.0)
     e, v, a = np.full(6, 0.1), np.full(6, 0.2), np.full(6, 0.3)
-    pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K), damping_wrench(2.0 * np.eye(6), v, a, D)
+    pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
     assert_allclose(pull, 0.2 * K, rtol=0, atol=1e-14)
     assert_allclose(pull + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
 
@@ -148,20 +148,33 @@ def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed
         assert_allclose(share * push, bound, rtol=1e-9, atol=1e-9)
 
 
-@given(seeds, st.floats(1e-3, 0.5), st.floats(1e-2, 2.0))
-def test_clipped_error_keeps_its_direction_and_no_more_than_its_length(seed, length_max, angle_max):
-    asked = np.random.default_rng(seed).normal(size=6) * 10.0 ** np.random.default_rng(seed).uniform(-4, 1)
-    error = asked.copy()
-    clip_error(error, length_max, angle_max)
-    for part, most in ((slice(0, 3), length_max), (slice(3, 6), angle_max)):
-        size = np.linalg.norm(asked[part])
-        assert_allclose(error[part], asked[part] * min(1.0, most / size), rtol=1e-12, atol=0)
+@given(seeds, st.integers(1, 8), st.floats(1e-3, 100.0))
+def test_shortened_vector_keeps_its_direction_and_no_more_than_its_length(seed, n, length_max):
+    rng = np.random.default_rng(seed)
+    asked = rng.normal(size=n) * 10.0 ** rng.uniform(-4, 4)
+    x = asked.copy()
+    shorten(x, length_max)
+    assert_allclose(x, asked * min(1.0, length_max / np.linalg.norm(asked)), rtol=1e-12, atol=0)
 
 
-def test_error_without_a_bound_is_left_alone():
-    error = np.arange(6.0)
-    clip_error(error, np.inf, np.inf)
-    assert_array_equal(error, np.arange(6.0))
+def test_what_has_no_bound_is_left_alone():
+    x = np.arange(6.0)
+    shorten(x, np.inf)
+    assert_array_equal(x, np.arange(6.0))
+
+
+@given(seeds, st.floats(0.1, 20.0), st.floats(0.1, 100.0))
+def test_acceleration_asked_of_the_tool_is_bounded_and_keeps_its_direction(seed, linear_max, angular_max):
+    """Λ⁻¹ F = K e, its linear and its angular part each no longer than its bound."""
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(6, 6))
+    Lambda, e, K = B @ B.T + np.eye(6), rng.normal(size=6) * 0.3, rng.uniform(10.0, 1500.0, 6)
+    kept, asked = e.copy(), K * e
+    acceleration = np.linalg.solve(Lambda, stiffness_wrench(Lambda, e, K, linear_max, angular_max))
+    for part, most in ((slice(0, 3), linear_max), (slice(3, 6), angular_max)):
+        share = min(1.0, most / np.linalg.norm(asked[part]))
+        assert_allclose(acceleration[part], share * asked[part], rtol=1e-7, atol=1e-9)
+    assert_array_equal(e, kept)
 
 
 @given(seeds, st.floats(1e-3, 3.1))

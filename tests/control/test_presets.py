@@ -24,7 +24,8 @@ def test_paper_has_every_printed_parameter_and_nothing_beyond_it():
         assert getattr(config, name) == 0.0
     for name in ("push_yield_nm", "push_hold_nm", "push_yield_n", "push_hold_n", "push_tool_n", "tank_j"):
         assert getattr(config, name) == math.inf
-    assert config.error_max_m == config.error_max_rad == math.inf
+    for name in ("pull_max_m_s2", "pull_max_rad_s2", "posture_error_max_rad"):
+        assert getattr(config, name) == math.inf
     assert not config.passive_gains
 
 

@@ -126,7 +126,7 @@ def test_direction_is_that_of_the_torque_last_felt(panda):
 
 def pressing(panda, offset=0.05):
     """A target beyond an obstacle, its bound 2 N m; and the torque of an obstacle that stands before it."""
-    config = replace(presets.paper(), recover_s=0.2, push_yield_nm=2.0)
+    config = replace(presets.paper(), recover_s=0.2, push_yield_nm=2.0, push_meet_n=0.0)
     obstacle = panda.dynamics(panda.home, np.zeros(7))["J"][1] * -20.0
     return Felt(panda, config, reach(panda, [0.0, offset, 0.0])), obstacle
 
