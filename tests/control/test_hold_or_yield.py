@@ -42,14 +42,14 @@ def spring_force(plant):
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
-    """Never held against; after the blow it leaves 4 to 8 N of the 24 N with which the task alone presses."""
+    """Never held against; after the blow it leaves 2 to 8 N of the 24 N with which the task alone presses."""
     contacts, forces = [], []
     for out, _, plant in collision(panda, stiffness):
         contacts.append(out.contact)
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.holding for contact in contacts)
-    assert SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
+    assert 0.5 * SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])

@@ -140,11 +140,6 @@ def test_model_that_is_trusted_is_not_weighed(panda):
     assert not controller.record["state"]["mass_error"].any()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="what stays below the threshold is learned without bound: under 25 N on link 4 that lasts 5 s, link 4 is "
-    "believed to weigh 67 % more, eleven standard deviations, and letting go shows as a contact of 2.7 s",
-)
 def test_lasting_push_below_the_threshold_is_not_taken_for_a_weight_that_cannot_be(panda):
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 300, UNTOUCHED)

@@ -298,8 +298,8 @@ def power_limit(tau_net, qd, tank, power, drain_s):
     """
     allowed = power + max(tank, 0.0) / drain_s
     given = dot(tau_net, qd)
-    if given > allowed:
-        speed = dot(qd, qd)
+    speed = dot(qd, qd)
+    if given > allowed and speed > _STILL:
         for i in range(qd.shape[0]):
             tau_net[i] -= (given - allowed) / speed * qd[i]
 
@@ -336,6 +336,9 @@ def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness
         elif high > 0.0:
             tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - stiffness * high
 
+
+_STILL = 1e-12
+"""Speed squared below which an arm stands still, rad²/s²: no torque gives it any power worth the name."""
 
 _FADE_RAD_S = 0.1
 """Excess of speed at which nothing pushes a joint on any more, rad/s."""
