@@ -91,7 +91,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         (
             "experiment dancing",
             "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, "
-            "detection",
+            "detection, hostile",
         ),
         (
             "experiment disturbance --controllers safe,best",

@@ -102,7 +102,7 @@ def test_command_gives_no_more_energy_than_the_tank_where_motors_take_any_torque
 
 
 def swept(arm, K, ticks=4000):
-    """Lead the tool 5 cm ahead, critically damped; give the most energy of any window, J, and share of speed limit."""
+    """Lead the tool 5 cm ahead; give the greatest energy of any window, J, and the share of the speed limit reached."""
     rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):

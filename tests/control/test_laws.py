@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
+    passes_elsewhere,
     push_along,
     shorten,
     stiffness_wrench,
@@ -146,6 +147,28 @@ def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed
         assert share == 1.0
     else:
         assert_allclose(share * push, bound, rtol=1e-9, atol=1e-9)
+
+
+@given(seeds, st.floats(0.0, 0.08), st.floats(0.0, 200.0))
+def test_a_touch_of_the_tool_never_passes_elsewhere(seed, distance, force):
+    """A force of any direction at any point within the tool's radius, and a moment as large as noise may show."""
+    rng = np.random.default_rng(seed)
+    point, F, noise = rng.normal(size=(3, 3))
+    point *= distance / np.linalg.norm(point)
+    F *= force / np.linalg.norm(F)
+    noise *= 1.99 / np.linalg.norm(noise)
+    assert not passes_elsewhere(np.array([*F, *(np.cross(point, F) + noise)]), 0.08, 2.0)
+
+
+@given(seeds, st.floats(0.1, 1.0), st.floats(0.0, 100.0))
+def test_a_force_whose_line_passes_far_from_the_tool_is_not_its(seed, distance, beyond):
+    """Once it is large enough for noise not to explain its moment."""
+    rng = np.random.default_rng(seed)
+    F, point = rng.normal(size=(2, 3))
+    F *= (2.0 / (distance - 0.08) + beyond + 0.01) / np.linalg.norm(F)
+    point -= F * (F @ point) / (F @ F)
+    point *= distance / np.linalg.norm(point)
+    assert passes_elsewhere(np.array([*F, *np.cross(point, F)]), 0.08, 2.0)
 
 
 @given(seeds, st.integers(1, 8), st.floats(1e-3, 100.0))

@@ -86,21 +86,14 @@ def test_goes_where_it_is_told(scene):
     assert seen.out.fault == "none"
 
 
-UNDERRATED = pytest.mark.xfail(
-    strict=True,
-    reason="without a skin the lever arm is guessed too short (0.117 m for 0.24, 0.052 m for 0.11), so push_hold_n "
-    "bounds the hold below the pusher's own torque: the tool is carried 0.17 m (Panda) and 0.19 m (six joints) away",
-)
-
-
 @pytest.mark.parametrize(
     ("make", "push"),
     [
         (fr3, (0.0, 25.0, 0.0)),
         (fr3, (0.0, 0.0, -25.0)),
         (panda_in_a_cell, (0.0, 25.0, 0.0)),
-        pytest.param(panda_in_a_cell, (0.0, 0.0, -25.0), marks=UNDERRATED),
-        pytest.param(six, (0.0, 25.0, 0.0), marks=UNDERRATED),
+        (panda_in_a_cell, (0.0, 0.0, -25.0)),
+        (six, (0.0, 25.0, 0.0)),
         (six, (0.0, 0.0, -25.0)),
     ],
 )

@@ -1,4 +1,4 @@
-"""Without a force sensor the null space tells tool from arm: what a tool feels never shows there."""
+"""Without a force sensor: what a tool feels never shows in the null space, and its line passes near the tool."""
 
 from dataclasses import replace
 
@@ -75,29 +75,41 @@ def test_contact_of_the_arm_is_found_while_the_tool_wipes(panda):
     assert np.linalg.norm(torque - truth) < 0.35 * np.linalg.norm(truth)
 
 
-BLIND = pytest.mark.xfail(
+LIKE_A_TOUCH = pytest.mark.xfail(
     strict=True,
-    reason="what a contact does in task directions counts as the tool's: a push with little share in the null space is "
-    "never found. 25 N on link 6 carry the tool 149 mm in 3 s (5.0 mm with a sensor); a wrist against an obstacle "
-    "presses 24 N for good (3.8 N with one)",
+    reason="a push whose line passes within 16 cm of the tool (8 cm and 2 N m at 25 N) counts as a touch of the tool, "
+    "and nothing holds against those: 25 N downwards carry the tool 71 mm (link 5) and 149 mm (link 6) in 3 s, and on; "
+    "2.6 and 5.0 mm with a sensor",
 )
 
 
-@BLIND
-@pytest.mark.parametrize(("body", "force"), [("link5", (0.0, 0.0, -25.0)), ("link6", (0.0, 0.0, -25.0))])
+@pytest.mark.parametrize(
+    ("body", "force"),
+    [
+        ("link4", (25.0, 0.0, 0.0)),
+        ("link5", (0.0, 25.0, 0.0)),
+        ("link5", (25.0, 0.0, 0.0)),
+        ("link6", (0.0, 25.0, 0.0)),
+        pytest.param("link5", (0.0, 0.0, -25.0), marks=LIKE_A_TOUCH),
+        pytest.param("link6", (0.0, 0.0, -25.0), marks=LIKE_A_TOUCH),
+    ],
+)
 def test_lasting_push_anywhere_on_the_arm_is_held_against(panda, body, force):
-    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    """By little in the null space, but its line passes far from the tool: within 4.2 mm, as with a sensor."""
+    plant, controller, still, away = Plant(panda), controller_at(panda, SAFE), hold(panda), []
     before = plant.tool_position()
     plant.push(body, force)
-    plant.run(controller, hold(panda), 3000)
-    assert np.linalg.norm(plant.tool_position() - before) < 0.015
+    for _ in range(3000):
+        plant.run(controller, still, 1)
+        away.append(np.linalg.norm(plant.tool_position() - before))
+    assert max(away) < 0.010
 
 
-@BLIND
-def test_obstacle_before_the_wrist_is_yielded_to(panda):
+def test_obstacle_before_the_wrist_is_pressed_no_harder_than_one_before_the_tool(panda):
+    """12.8 N, where the task alone presses 24 N; 3.8 N with a sensor."""
     plant = wrist_meets_sphere(panda, 0.04, 2000.0)
     controller, start = controller_at(panda, SAFE), plant.tool_position()[1]
     for k in range(120):
         ahead = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
         plant.run(controller, reach(panda, [0.0, ahead, 0.0]), 17)
-    assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < 3 * SAFE.push_yield_n
+    assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < SAFE.push_tool_n

@@ -34,6 +34,8 @@ class ControllerConfig:
             the arm; 0 to trust the model.
         payload_uncertainty_kg: the same of the tool's mass, kg.
         tool_memory_s: without a force sensor: time constant of the tool's wrench as it was before a contact, s.
+        tool_radius_m: without a force sensor: no touch of the tool is further than this from the tool point, m.
+        tool_moment_nm: without a force sensor: moment at the tool that noise and model errors may show, N m.
         dwell_s: t_c, least time in contact mode, s.
         release_s: time the residual must have stayed below δ before contact mode ends, s.
         recover_s: time constant with which the task's pull comes back after it gave way to a contact, s; 0 for at once.
@@ -87,7 +89,9 @@ class ControllerConfig:
     inertia_uncertainty: float = 0.0
     mass_uncertainty: float = 0.0
     payload_uncertainty_kg: float = 0.0
-    tool_memory_s: float = 0.05
+    tool_memory_s: float = 0.2
+    tool_radius_m: float = 0.08
+    tool_moment_nm: float = 2.0
     dwell_s: float = 0.05
     release_s: float = 0.0
     recover_s: float = 0.0

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.control.laws import momentum, observer_step, weigh
+from contactsafe.control.laws import momentum, observer_step, passes_elsewhere, weigh
 from contactsafe.control.records import FREE
 from contactsafe.robot.dynamics import mass_regressor
 from contactsafe.robot.friction import joint_friction
@@ -97,8 +97,9 @@ def part_tool_from_arm(c, J_bar):
     """Split the residual into the tool's share and the arm's; fill `arm_torque`, `arm_torque_trigger` and `alarm`.
 
     With a force sensor the tool's wrench is known and taken out already. Without one, a wrench at the tool never shows
-    in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact; and of the rest, the wrench that was there before
-    the contact stays the tool's. An arm without a null space cannot tell: there all of it counts as the arm's.
+    in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force whose line passes far from the tool;
+    of the rest, the wrench that was there before the contact stays the tool's. An arm without a null space cannot tell:
+    there all of it counts as the arm's.
     """
     state, J = c.state, c.dynamics.J
     n = state.tau.shape[0]
@@ -108,7 +109,8 @@ def part_tool_from_arm(c, J_bar):
         state.arm_torque_trigger[:] = state.residual_trigger
         return
     wrench = matvec_t(J_bar, state.residual_trigger)
-    state.alarm -= matvec_t(J, wrench)
+    if not passes_elsewhere(wrench, c.params.tool_radius_m, c.params.tool_moment_nm):
+        state.alarm -= matvec_t(J, wrench)
     if state.mode == FREE:
         observer_step(state.tool_wrench, c.params.tool_share, wrench)
     tau_tool = matvec_t(J, state.tool_wrench)

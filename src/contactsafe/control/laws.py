@@ -248,6 +248,19 @@ def weigh(mass_error, covariance, row, torque, variance):
 
 
 @compiled
+def passes_elsewhere(wrench, radius, margin):
+    """Tell whether a wrench at the tool point cannot come from a touch of the tool: its line passes elsewhere.
+
+    Args:
+        wrench: about the tool point, (6,), N and N m.
+        radius: of the tool about that point, m.
+        margin: moment that noise may show, N m.
+    """
+    force, moment = wrench[:3], wrench[3:]
+    return math.sqrt(dot(moment, moment)) > radius * math.sqrt(dot(force, force)) + margin
+
+
+@compiled
 def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
@@ -285,8 +298,8 @@ def power_limit(tau_net, qd, tank, power, drain_s):
     """
     allowed = power + max(tank, 0.0) / drain_s
     given = dot(tau_net, qd)
-    if given > allowed:
-        speed = dot(qd, qd)
+    speed = dot(qd, qd)
+    if given > allowed and speed > _STILL:
         for i in range(qd.shape[0]):
             tau_net[i] -= (given - allowed) / speed * qd[i]
 
@@ -323,6 +336,9 @@ def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness
         elif high > 0.0:
             tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - stiffness * high
 
+
+_STILL = 1e-12
+"""Speed squared below which an arm stands still, rad²/s²: no torque gives it any power worth the name."""
 
 _FADE_RAD_S = 0.1
 """Excess of speed at which nothing pushes a joint on any more, rad/s."""

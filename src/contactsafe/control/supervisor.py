@@ -62,8 +62,8 @@ def _locate(c, link):
     state = c.state
     first = state.contact_link == 0
     points = c.handle.skin_points
-    if first:
-        _take_link(c, link, contact_lever(c.handle, link, state.direction), 1.0)
+    if first or points == 0:
+        _take_link(c, link, _longest_lever(c, link), 1.0)
     if state.search_at == 0:
         state.search_point, state.search_fit = -1, 0.0
     stop = points if first else min(state.search_at + _POINTS_A_TICK, points)
@@ -75,6 +75,15 @@ def _locate(c, link):
     if state.search_at == 0 and state.search_point >= 0:
         found = skin_torque(c.handle, state.search_point, torque)
         _take_link(c, found, _size(torque), 1.0 if first else _LEVER_SHARE)
+
+
+@compiled
+def _longest_lever(c, link):
+    """Longest lever arm of the links that may be touched where no skin says which: near its joint a link shows less."""
+    lever = 0.0
+    for further in range(link, c.state.direction.shape[0] + 1):
+        lever = max(lever, contact_lever(c.handle, further, c.state.direction))
+    return lever
 
 
 @compiled
