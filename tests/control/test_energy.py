@@ -12,7 +12,7 @@ from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
 from tests.control.targets import hostile_target
 
 from contactsafe import Measurement, Pose, Target, presets
-from contactsafe.control.laws import passive_step, power_limit
+from contactsafe.control.limits import passive_step, power_limit
 
 SAFE = replace(presets.safe(), friction_compensation=False)
 ALPHA, DT = 2.0, 0.001

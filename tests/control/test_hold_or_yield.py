@@ -49,7 +49,7 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.holding for contact in contacts)
-    assert 0.5 * SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
+    assert 0.9 * SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
@@ -176,14 +176,6 @@ def test_tool_stays_where_it_is_when_the_pusher_lets_go(panda, body, force):
     assert np.abs(np.diff(torque, axis=0)).max() <= 1.0
 
 
-SWINGS = pytest.mark.xfail(
-    strict=True,
-    reason="the posture comes back whole in one tick when contact ends: the command jumps by 13.5 N m and the arm "
-    "swings at 1.03 rad/s after 40 N on link 4, at 0.40 rad/s (5.7 N m) after 40 N on link 5",
-)
-
-
-@SWINGS
 @pytest.mark.parametrize(("body", "force"), PUSHES)
 def test_command_does_not_jump_when_contact_ends(quick_panda, body, force):
     """Motors that take any torque at once show what the law asks."""
@@ -191,8 +183,16 @@ def test_command_does_not_jump_when_contact_ends(quick_panda, body, force):
     assert np.abs(torque[end] - torque[end - 1]).max() < 1.0
 
 
-@SWINGS
-@pytest.mark.parametrize(("body", "force"), PUSHES)
+@pytest.mark.parametrize(
+    ("body", "force"),
+    [
+        PUSHES[0],
+        pytest.param(
+            *PUSHES[1],
+            marks=pytest.mark.xfail(strict=True, reason="after 40 N on link 4 the arm swings back at 0.35 rad/s"),
+        ),
+    ],
+)
 def test_arm_does_not_swing_back_when_contact_ends(panda, body, force):
     _, speed, end, _ = released(panda, body, force)
     assert speed[end:].max() < 0.25

@@ -77,11 +77,6 @@ def test_any_state_gives_a_finite_torque_within_its_limits(panda, seed):
         before = torque
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the first tick starts from g − Cᵀ q̇ as measured, unlimited, and the rate limit keeps it there: at 25 "
-    "rad/s, one spurious reading, a joint is sent 25 times the torque it is allowed",
-)
 def test_first_measurement_at_speed_gives_a_torque_within_its_limits(panda):
     rng = np.random.default_rng(3)
     for _ in range(20):

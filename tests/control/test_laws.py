@@ -11,13 +11,13 @@ from contactsafe.control.laws import (
     damping_wrench,
     passes_elsewhere,
     push_along,
-    shorten,
     stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
     tool_share,
 )
+from contactsafe.robot.linalg import shorten
 from contactsafe.robot.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
 
 FLOOR, DAMPING = 1e-2, 0.05

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from contactsafe.control.laws import joint_stop_torque, limit_torque
+from contactsafe.control.limits import joint_stop_torque, limit_torque
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
 torques = arrays(float, 3, elements=st.floats(-1e6, 1e6))

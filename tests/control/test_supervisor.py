@@ -109,7 +109,6 @@ def test_baseline_never_enters(panda):
     assert felt.out.contact.torque == pytest.approx(joint(4, 40.0))
 
 
-@pytest.mark.xfail(strict=True, reason="the link is looked for in contact mode alone, so the baseline reports link 0")
 def test_baseline_reports_the_link(panda):
     felt = Felt(panda, presets.vices())
     felt.feel(joint(4, 40.0), 300)

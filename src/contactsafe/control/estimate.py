@@ -33,7 +33,7 @@ def start(c):
     """Begin at rest: momentum as measured, command at gravity, so that nothing jumps; the links weigh what is said."""
     state, dynamics, params = c.state, c.dynamics, c.params
     state.started = 1
-    state.task_share = 1.0
+    state.task_share, state.posture_share = 1.0, 1.0
     state.tank_j = params.tank_j
     state.K_task[:] = state.target.K_task
     state.D_task[:] = state.target.D_task
@@ -150,7 +150,8 @@ def weigh_links(c):
     state.ticks += 1
     if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
         error = _NOISE_NM + state.threshold[i] - params.residual_threshold - _SIGMAS * state.gravity_sigma[i]
-        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], _CORRELATED * error * error)
+        largest = _SIGMAS * np.sqrt(params.mass_variance)
+        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], _CORRELATED * error * error, largest)
     state.gravity_sigma[i] = _gravity_sigma(c, i)
 
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t, spd_inverse
+from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t, shorten, spd_inverse
 from contactsafe.robot.rotation import orientation_error
 
 
@@ -74,15 +74,6 @@ def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
     shorten(acceleration[:3], linear_max)
     shorten(acceleration[3:], angular_max)
     return matvec(Lambda, acceleration)
-
-
-@compiled
-def shorten(x, length_max):
-    """Scale a vector in place to a largest length."""
-    length = math.sqrt(dot(x, x))
-    if length > length_max:
-        for i in range(x.shape[0]):
-            x[i] *= length_max / length
 
 
 @compiled
@@ -229,8 +220,10 @@ def observer_step(residual, share, tau_external):
 
 
 @compiled
-def weigh(mass_error, covariance, row, torque, variance):
+def weigh(mass_error, covariance, row, torque, variance, largest):
     """Learn in place what the links weigh from one joint's gravity torque: one step of a Kalman filter.
+
+    What a link cannot weigh is not believed: a push too faint to be noticed would otherwise be learned as weight.
 
     Args:
         mass_error: relative error of each link's mass, (m,); updated.
@@ -238,11 +231,12 @@ def weigh(mass_error, covariance, row, torque, variance):
         row: gravity torque of the joint per relative error, (m,), N m.
         torque: found at the joint beyond the model's, N m.
         variance: of that reading, (N m)².
+        largest: relative error that is believed at most, (m,).
     """
     P_row = matvec(covariance, row)
     share = 1.0 / (dot(row, P_row) + variance)
     for i in range(row.shape[0]):
-        mass_error[i] += P_row[i] * share * torque
+        mass_error[i] = min(max(mass_error[i] + P_row[i] * share * torque, -largest[i]), largest[i])
         for j in range(row.shape[0]):
             covariance[i, j] -= P_row[i] * share * P_row[j]
 
@@ -258,111 +252,3 @@ def passes_elsewhere(wrench, radius, margin):
     """
     force, moment = wrench[:3], wrench[3:]
     return math.sqrt(dot(moment, moment)) > radius * math.sqrt(dot(force, force)) + margin
-
-
-@compiled
-def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
-    """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
-
-    Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016, eq. 12), each axis by
-    itself. Falling gains are free.
-
-    Args:
-        K, D: in force, (6,), 1/s² and 1/s; updated.
-        K_wanted, D_wanted: (6,).
-        dt: tick, s.
-        damping_min: α, least damping that may ever be asked for, 1/s.
-        limited: whether to limit at all.
-    """
-    for i in range(6):
-        way = K_wanted[i] - K[i] + damping_min * (D_wanted[i] - D[i])
-        most = 2.0 * damping_min * K[i] * dt
-        share = most / way if limited and way > most else 1.0
-        K[i] += share * (K_wanted[i] - K[i])
-        D[i] += share * (D_wanted[i] - D[i])
-
-
-@compiled
-def power_limit(tau_net, qd, tank, power, drain_s):
-    """Damp a command in place so that it gives the arm no more power than a tank of energy can pay.
-
-    The tank is filled with a steady power and by what the command takes out of the arm. Its level falls no faster than
-    level/drain_s beyond that power; the torque taken off is the smallest that does it, along q̇.
-
-    Args:
-        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
-        qd: (n,), rad/s.
-        tank: level, J.
-        power: steady, W.
-        drain_s: s.
-    """
-    allowed = power + max(tank, 0.0) / drain_s
-    given = dot(tau_net, qd)
-    speed = dot(qd, qd)
-    if given > allowed and speed > _STILL:
-        for i in range(qd.shape[0]):
-            tau_net[i] -= (given - allowed) / speed * qd[i]
-
-
-@compiled
-def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness, deceleration, gain):
-    """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
-
-    A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit.
-    What is faster is braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a
-    spring pushes back.
-
-    Args:
-        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
-        q, qd: (n,), rad and rad/s.
-        M: joint inertia, (n, n), kg m².
-        q_min, q_max: range, (n,), rad.
-        qd_max: speed limits, (n,), rad/s.
-        margin: rad.
-        stiffness: N m/rad of intrusion.
-        deceleration: a, rad/s².
-        gain: braking per excess of speed, 1/s.
-    """
-    for i in range(q.shape[0]):
-        way = 1.0 if qd[i] > 0.0 else -1.0
-        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin
-        excess = way * qd[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
-        if excess > 0.0:
-            on = max(way * tau_net[i], 0.0) * min(excess / _FADE_RAD_S, 1.0)
-            tau_net[i] -= way * (on + gain * M[i, i] * excess)
-        low, high = q_min[i] + margin - q[i], q[i] - q_max[i] + margin
-        if low > 0.0:
-            tau_net[i] = max(tau_net[i], -max(1.0 - low / margin, 0.0) * abs(tau_net[i])) + stiffness * low
-        elif high > 0.0:
-            tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - stiffness * high
-
-
-_STILL = 1e-12
-"""Speed squared below which an arm stands still, rad²/s²: no torque gives it any power worth the name."""
-
-_FADE_RAD_S = 0.1
-"""Excess of speed at which nothing pushes a joint on any more, rad/s."""
-
-
-@compiled
-def limit_torque(tau, tau_previous, tau_max, step_max):
-    """Clip a command in place to the torque limits and to a largest change per tick.
-
-    Args:
-        tau: command, (n,), N m; updated.
-        tau_previous: last command sent, (n,), N m.
-        tau_max: (n,), N m.
-        step_max: N m per tick.
-
-    Returns:
-        True where anything was clipped.
-    """
-    clipped = False
-    for i in range(tau.shape[0]):
-        low = max(-tau_max[i], tau_previous[i] - step_max)
-        high = min(tau_max[i], tau_previous[i] + step_max)
-        value = min(max(tau[i], low), high)
-        if value != tau[i]:
-            clipped = True
-        tau[i] = value
-    return clipped

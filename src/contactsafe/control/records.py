@@ -77,7 +77,17 @@ def params_dtype(n: int) -> np.dtype:
     return np.dtype(
         [(name, _f) for name in _copied(float)]
         + [(name, _i) for name in _copied(bool)]
-        + [(name, _f) for name in ("stiffness_min", "stiffness_max", "damping_min", "damping_max", "torque_step")]
+        + [
+            (name, _f)
+            for name in (
+                "stiffness_min",
+                "stiffness_max",
+                "damping_min",
+                "damping_max",
+                "torque_step",
+                "posture_in_contact",
+            )
+        ]
         + [(name, _f) for name in _SHARES]
         + [("dwell_ticks", _i), ("release_ticks", _i)]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "qd_max", "tau_max")]
@@ -132,6 +142,7 @@ def state_dtype(n: int) -> np.dtype:
             ("search_at", _i),  # next point of the skin to be searched
             ("search_point", _i),  # best one of this search so far, −1 for none
             ("search_fit", _f),  # cosine between its torque and the one found
+            ("posture_share", _f),  # of K_pose in force
             ("task_share", _f),  # of what pulls to the target in force, 0 … 1
             ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
             ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
@@ -194,6 +205,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["dwell_ticks"] = round(config.dwell_s / dt)
     params["release_ticks"] = round(config.release_s / dt)
     params["recover_share"] = share_per_tick(config.recover_s, dt)
+    params["posture_in_contact"] = 0.0 if config.recover_s > 0 else 1.0
     params["probe_share"] = share_per_tick(config.probe_s, dt)
     params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
     params["mass_variance"] = _mass_variance(config, arm)

@@ -45,7 +45,7 @@ def supervise(c):
         state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
         _locate(c, link)
     _watch_push(c)
-    c.output.link = 0 if link == 0 else state.contact_link
+    c.output.link = state.contact_link if link != 0 and state.contact_link != 0 else link
 
 
 @compiled

@@ -17,23 +17,19 @@ from contactsafe.control.estimate import (
 from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
-    joint_stop_torque,
-    limit_torque,
-    passive_step,
-    power_limit,
     push_along,
-    shorten,
     stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
     tool_share,
 )
+from contactsafe.control.limits import joint_stop_torque, limit_torque, passive_step, power_limit
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import dot, matmul, matvec_t
+from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
 
@@ -168,7 +164,8 @@ def _law(c, Lambda, J_bar):
     F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, state.D_task)
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, params.K_pose * q_error)
+    _follow_posture(state, params)
+    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, state.posture_share * params.K_pose * q_error)
     damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
     share = tool_share(F_spring, _tool_force(c, J_bar), params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
@@ -196,6 +193,15 @@ def _follow_share(state, params, wanted):
     else:
         back = params.recover_share if state.holding == 0 else params.hold_share
         state.task_share += back * (wanted - state.task_share)
+
+
+@compiled
+def _follow_posture(state, params):
+    """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
+    if state.mode == FREE:
+        state.posture_share += params.recover_share * (1.0 - state.posture_share)
+    else:
+        state.posture_share = params.posture_in_contact
 
 
 @compiled

@@ -128,7 +128,7 @@ def draw_plant(rng: np.random.Generator, n: int) -> PlantConfig:
 def draw_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
     """Draw what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or wiping."""
     rng, board = scene_rng(seed, 0), board or BoardConfig()
-    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.2, rng.random() < 0.5
+    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
     speed = rng.uniform(0.1, 0.3 if wiping else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)

@@ -10,6 +10,7 @@ from contactsafe.experiments.collision_scenes import draw_plant, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
+from contactsafe.robot import robots
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
 
 QUESTION = (
@@ -26,7 +27,6 @@ MODES = ("holding", "wiping")
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 """K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
 
-_JOINTS = 7
 _HOLD_HEIGHT = 0.06  # m above the board
 _PRESS = 0.004  # depth of x_d below the board while wiping, m
 _STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
@@ -68,7 +68,8 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
     config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS))
-    worlds = [WorldConfig(plant=draw_plant(scene_rng(seed, 0), _JOINTS), sensors=REAL_SENSORS) for seed in seeds]
+    arm = robots.panda()
+    worlds = [WorldConfig(plant=draw_plant(scene_rng(seed, 0), arm.n), sensors=REAL_SENSORS) for seed in seeds]
     tasks = WipingTasks(config, len(seeds), list(seeds), worlds)
     x, y, z = tasks.config.world.board.centre
     start = np.array([x, y, z + _HOLD_HEIGHT])

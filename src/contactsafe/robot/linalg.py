@@ -1,5 +1,7 @@
 """Small dense algebra for the compiled tick: at six or seven rows a LAPACK call costs more than the work."""
 
+import math
+
 import numpy as np
 
 from contactsafe.compiled import compiled
@@ -106,3 +108,12 @@ def cross_into(x, y, out):
     out[0] = x[1] * y[2] - x[2] * y[1]
     out[1] = x[2] * y[0] - x[0] * y[2]
     out[2] = x[0] * y[1] - x[1] * y[0]
+
+
+@compiled
+def shorten(x, length_max):
+    """Scale a vector in place to a largest length."""
+    length = math.sqrt(dot(x, x))
+    if length > length_max:
+        for i in range(x.shape[0]):
+            x[i] *= length_max / length
