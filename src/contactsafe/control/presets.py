@@ -53,7 +53,7 @@ def safe() -> ControllerConfig:
         push_yield_n=4.0,
         push_hold_n=45.0,
         push_meet_n=25.0,
-        probe_m=0.001,
+        probe_m=0.0005,
         push_tool_n=20.0,
         hold_recover_s=0.03,
         joint_margin=0.2,

@@ -123,7 +123,7 @@ def _watch_push(c):
     moved, torque = state.moved_smooth_rad, state.torque_smooth_nm
     step = params.probe_m / lever
     if moved <= 0.0:  # the arm moves into it
-        state.moved_rad, state.moved_smooth_rad, state.reference_nm = min(state.moved_rad, 0.0), 0.0, torque
+        state.moved_rad, state.moved_smooth_rad, state.reference_nm = state.moved_rad - moved, 0.0, torque
     state.judge_rad = min(state.judge_rad, moved + step)
     if moved >= state.judge_rad:
         state.judge_rad = moved + step
@@ -131,7 +131,7 @@ def _watch_push(c):
             state.holding = 1
             state.hold_s = max(2.0 * state.hold_s, params.hold_s)
             state.hold_nm = params.hold_margin * torque
-        else:
+        elif state.holding == 0 or moved >= 4.0 * step:
             state.holding, state.hold_s, state.hold_nm, state.meet_n = 0, 0.0, 0.0, 0.0
     if state.holding != 0:
         state.hold_nm *= 1.0 - params.dt / state.hold_s

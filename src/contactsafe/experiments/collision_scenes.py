@@ -207,7 +207,8 @@ def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.G
     centre = at + (radius + _CLEAR_M) * normal
     if motion.holds:
         gap, depth = 0.4 * speed, min(push_n / thing.stiffness, 0.03)
-        start = centre + gap * normal
+        touch = _touching(arm, q_free[[when]], at, normal, radius)
+        start = touch + gap * normal
         arrival = motion.meets_s + depth / speed
         obstacle = replace(
             thing, position=_vector(start), travel=_vector(-(gap + depth) * normal), travel_s=(0.2, arrival)
@@ -219,6 +220,15 @@ def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.G
         return None
     clear = clearance(arm, q_free[: when - 10 : 10], centre) > radius
     return Meeting(replace(thing, position=_vector(centre)), link) if clear else None
+
+
+def _touching(arm: Arm, q: np.ndarray, at: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
+    """Give where on a line a sphere just touches the arm: the surface drawn may lie within another capsule."""
+    near, far = 0.0, 0.5
+    while far - near > 1e-5:
+        middle = 0.5 * (near + far)
+        near, far = (near, middle) if clearance(arm, q, at + middle * normal) > radius else (middle, far)
+    return at + far * normal
 
 
 def draw_thing(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> Obstacle:
