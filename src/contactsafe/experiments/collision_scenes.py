@@ -33,6 +33,7 @@ _PRESS_M = 0.004
 _MARGIN_RAD = 0.15  # of the joint range, kept free along the path
 _CLEAR_M = 0.002
 _SKIN_S = 0.02
+_DEEPEST_M = 0.03  # what comes to a held arm goes no further than this into where the arm was
 
 
 @dataclass(frozen=True)
@@ -206,12 +207,14 @@ def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.G
     normal = frames[1][1][0, link] @ normal
     centre = at + (radius + _CLEAR_M) * normal
     if motion.holds:
-        gap, depth = 0.4 * speed, min(push_n / thing.stiffness, 0.03)
-        touch = _touching(arm, q_free[[when]], at, normal, radius)
-        start = touch + gap * normal
-        arrival = motion.meets_s + depth / speed
+        gap = 0.4 * speed
+        start = _touching(arm, q_free[[when]], at, normal, radius) + gap * normal
         obstacle = replace(
-            thing, position=_vector(start), travel=_vector(-(gap + depth) * normal), travel_s=(0.2, arrival)
+            thing,
+            position=_vector(start),
+            travel=_vector(-(gap + _DEEPEST_M) * normal),
+            travel_s=(0.2, motion.meets_s + _DEEPEST_M / speed),
+            travel_until_n=push_n,
         )
         clear = clearance(arm, q_free[:1], start) > radius
         return Meeting(obstacle, link) if clear else None

@@ -147,6 +147,7 @@ class Obstacle:
         surface_s: time constant of MuJoCo's contact, s: the larger, the softer its skin (0.02 is MuJoCo's default).
         travel: way that its hold moves, world, m.
         travel_s: when it sets off and when it arrives, s since reset.
+        travel_until_n: its hold stops for good once it presses this hard on the arm, N; inf to go all the way.
     """
 
     position: Vector3
@@ -158,6 +159,7 @@ class Obstacle:
     surface_s: float = 0.004
     travel: Vector3 = (0.0, 0.0, 0.0)
     travel_s: tuple[float, float] = (0.0, 1.0)
+    travel_until_n: float = math.inf
 
     @property
     def fixed(self) -> bool:

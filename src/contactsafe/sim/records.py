@@ -43,6 +43,8 @@ def plant_dtype(n: int) -> np.dtype:
             ("obstacle_springs", _i, (MAX_OBSTACLES,)),  # address of the first spring's rest length; −1 for none
             ("obstacle_travel", _f, (MAX_OBSTACLES, 3)),  # m
             ("obstacle_travel_ticks", _f, (MAX_OBSTACLES, 2)),  # departure and arrival
+            ("obstacle_travel_n", _f, (MAX_OBSTACLES,)),  # force on the arm that ends the travel
+            ("obstacle_stopped", _i, (MAX_OBSTACLES,)),  # 1 once that was reached
             ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
             ("q_sigma", _f),
             ("qd_sigma", _f),
@@ -130,6 +132,7 @@ def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, conf
         plant["obstacle_bodies"][index] = model.body(f"obstacle{index}").id
         plant["obstacle_springs"][index] = -1 if obstacle.fixed else model.joint(f"obstacle{index}_x").qposadr[0]
         plant["obstacle_travel"][index] = obstacle.travel
+        plant["obstacle_travel_n"][index] = obstacle.travel_until_n
         plant["obstacle_travel_ticks"][index] = np.array(obstacle.travel_s) / model.opt.timestep
     plant["friction"] = arm.friction
     plant["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")

@@ -109,7 +109,9 @@ def _move_obstacles(plant):
     rest = view1(plant.qpos_spring, plant.nq)
     for index in range(plant.n_obstacles):
         adr = plant.obstacle_springs[index]
-        if adr >= 0:
+        if plant.tick > 0 and force_of_obstacle(plant, index) >= plant.obstacle_travel_n[index]:
+            plant.obstacle_stopped[index] = 1
+        if adr >= 0 and plant.obstacle_stopped[index] == 0:
             start, stop = plant.obstacle_travel_ticks[index]
             share = min(max((plant.tick - start) / (stop - start), 0.0), 1.0)
             for k in range(3):
@@ -159,13 +161,18 @@ def pad_force(plant, out):
 
 
 @compiled
+def force_of_obstacle(plant, index):
+    """Give the |force| between the arm and one obstacle by the simulator, N."""
+    force = view1(plant.sensordata, plant.nsensordata)[plant.adr_obstacles[index] + 1 :]
+    return math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
+
+
+@compiled
 def obstacle_force(plant):
     """Give the largest |force| between the arm and one obstacle by the simulator, N."""
-    data = view1(plant.sensordata, plant.nsensordata)
     largest = 0.0
     for index in range(plant.n_obstacles):
-        adr = plant.adr_obstacles[index]
-        largest = max(largest, math.sqrt(data[adr + 1] ** 2 + data[adr + 2] ** 2 + data[adr + 3] ** 2))
+        largest = max(largest, force_of_obstacle(plant, index))
     return largest
 
 

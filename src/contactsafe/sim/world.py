@@ -153,7 +153,7 @@ class Worlds:
         self.controllers[i]["dynamics"] = dynamics
         data.ctrl[:] = dynamics["g"]
         mujoco.mj_forward(model, data)
-        plant["tick"], plant["push_body"] = 0, 0
+        plant["tick"], plant["push_body"], plant["obstacle_stopped"] = 0, 0, 0
         plant["q_seen"], plant["qd_seen"] = q, 0.0
         plant["tau_delayed"] = dynamics["g"]
         sensors = self.configs[i].sensors
