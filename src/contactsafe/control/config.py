@@ -32,6 +32,7 @@ class ControllerConfig:
         inertia_uncertainty: share of the inertial torque that is added to δ.
         mass_uncertainty: standard deviation of the links' relative mass error, which is learned while nothing touches
             the arm; 0 to trust the model.
+        mass_settle_s: time constant with which what was learned enters the command, s.
         payload_uncertainty_kg: the same of the tool's mass, kg.
         tool_memory_s: without a force sensor: time constant of the tool's wrench as it was before a contact, s.
         tool_radius_m: without a force sensor: no touch of the tool is further than this from the tool point, m.
@@ -88,6 +89,7 @@ class ControllerConfig:
     friction_uncertainty: float = 0.0
     inertia_uncertainty: float = 0.0
     mass_uncertainty: float = 0.0
+    mass_settle_s: float = 5.0
     payload_uncertainty_kg: float = 0.0
     tool_memory_s: float = 0.2
     tool_radius_m: float = 0.08

@@ -50,13 +50,21 @@ def start(c):
 
 @compiled
 def correct_gravity(c):
-    """Add what the links were found to weigh more than the model says to the model's gravity torque."""
+    """Add what the links were found to weigh more than the model says to the model's gravity torque.
+
+    The observer takes it at once, the command slowly: an arm in free motion moves as its model has it, and what was
+    learned wrongly from a light touch does not pull the arm.
+    """
+    state = c.state
+    state.gravity_command[:] = c.dynamics.g
     if c.params.mass_uncertainty == 0.0:
         return
     mass_regressor(c.handle, c.dynamics.mass_regressor)
     if c.measurement.has_wrench != 0:
         c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
-    c.dynamics.g += matvec(c.dynamics.mass_regressor, c.state.mass_error)
+    state.mass_settled += c.params.settle_share * (state.mass_error - state.mass_settled)
+    state.gravity_command += matvec(c.dynamics.mass_regressor, state.mass_settled)
+    c.dynamics.g += matvec(c.dynamics.mass_regressor, state.mass_error)
 
 
 @compiled

@@ -63,6 +63,7 @@ _SHARES = (
     "probe_share",
     "hold_share",
     "tool_share",
+    "settle_share",
 )
 """Parts of their way that first-order filters go in one tick."""
 
@@ -127,7 +128,9 @@ def state_dtype(n: int) -> np.dtype:
             ("alarm", _f, (n,)),  # what is held against the thresholds, N m
             ("threshold", _f, (n,)),  # N m
             ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
+            ("mass_settled", _f, (n + 1,)),  # of it, what the command believes by now
             ("mass_covariance", _f, (n + 1, n + 1)),
+            ("gravity_command", _f, (n,)),  # gravity torque that the command compensates, N m
             ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
             ("turn", _i),  # joint whose residual is weighed next
             ("ticks", _i),  # since reset
@@ -208,6 +211,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["posture_in_contact"] = 0.0 if config.recover_s > 0 else 1.0
     params["probe_share"] = share_per_tick(config.probe_s, dt)
     params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
+    params["settle_share"] = share_per_tick(config.mass_settle_s, dt)
     params["mass_variance"] = _mass_variance(config, arm)
     params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)

@@ -100,7 +100,7 @@ def _tick_without_measurement(c):
     state.bad_ticks += 1
     if state.bad_ticks > LOST_AFTER_TICKS:
         state.fault = _LOST
-        tau = c.dynamics.g.copy()
+        tau = state.gravity_command.copy()
         limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step)
         state.tau[:] = tau
     c.output.torque[:] = state.tau
@@ -174,7 +174,7 @@ def _law(c, Lambda, J_bar):
         tau = state.task_share * pull + damping
     else:
         tau = _contact_law(c, pull, damping, matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque)), N_t - N_ct, share)
-    return tau + dynamics.c + dynamics.g
+    return tau + dynamics.c + state.gravity_command
 
 
 @compiled
@@ -251,14 +251,14 @@ def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     q, qd = c.measurement.q, c.measurement.qd
-    tau -= dynamics.g + dynamics.c
+    tau -= state.gravity_command + dynamics.c
     joint_stop_torque(
         tau, q, qd, dynamics.M, params.q_min, params.q_max, params.qd_max, params.joint_margin,
         params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
     )  # fmt: skip
     tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
-    tau += dynamics.g
+    tau += state.gravity_command
     friction = np.zeros(q.shape[0])
     if params.friction_compensation != 0:
         friction = joint_friction(params.friction, qd)
@@ -266,7 +266,7 @@ def _finish(c, tau):
     out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
     state.tau[:] = tau
     state.friction[:] = friction
-    given = dot(tau - friction - dynamics.g, qd)
+    given = dot(tau - friction - state.gravity_command, qd)
     state.tank_j = min(state.tank_j + params.dt * (params.tank_power_w - given), params.tank_j)
     out.torque[:] = tau
     out.residual[:] = state.residual
