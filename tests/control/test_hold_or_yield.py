@@ -42,14 +42,19 @@ def spring_force(plant):
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
-    """Never held against; after the blow it leaves 3.8 to 6.1 N of the 24 N with which the task alone presses."""
+    """Never held against; after the blow it presses with 2 to 9 N, where the task alone presses with 24 N.
+
+    With less than about 3 N the contact can no longer be told from what is not known of the arm: contact mode ends, the
+    task comes back slowly and is found to press again.
+    """
     contacts, forces = [], []
     for out, _, plant in collision(panda, stiffness):
         contacts.append(out.contact)
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.holding for contact in contacts)
-    assert 0.9 * SAFE.push_yield_n < np.mean(forces[-300:]) < 2 * SAFE.push_yield_n
+    assert 0.7 * SAFE.push_yield_n < np.mean(forces[-1000:]) < 2 * SAFE.push_yield_n
+    assert max(forces[-1000:]) < 10.0
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])

@@ -30,6 +30,7 @@ class ControllerConfig:
         residual_threshold: δ, N m.
         friction_uncertainty: share of the nominal friction torque that is added to δ.
         inertia_uncertainty: share of the inertial torque that is added to δ.
+        delay_uncertainty_ticks: by how many ticks a command may come late; its change meanwhile is added to δ.
         mass_uncertainty: standard deviation of the links' relative mass error, which is learned while nothing touches
             the arm; 0 to trust the model.
         mass_settle_s: time constant with which what was learned enters the command, s.
@@ -53,7 +54,7 @@ class ControllerConfig:
         push_tool_n: largest commanded push of the tool against what it touches, N; inf for none.
         tool_contact_n: least force at the tool that counts as its contact, N.
         probe_m: way by which the arm gives way to a contact before it judges whether something pushes it, m.
-        probe_s: time constant with which torque and way are smoothed for that, s.
+        probe_s: time constant with which torque, way and the force at the tool are smoothed for that, s.
         pusher_stiffness: of the softest thing that counts as an obstacle and not as a pusher, N/m.
         hold_margin: the arm holds against this multiple of the pusher's torque.
         hold_s: time constant with which it then tries again whether the pusher is still there, s; doubled each time.
@@ -88,6 +89,7 @@ class ControllerConfig:
     residual_threshold: float = 1.5
     friction_uncertainty: float = 0.0
     inertia_uncertainty: float = 0.0
+    delay_uncertainty_ticks: float = 0.0
     mass_uncertainty: float = 0.0
     mass_settle_s: float = 5.0
     payload_uncertainty_kg: float = 0.0

@@ -46,6 +46,7 @@ def start(c):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
         state.tau[i] = state.beta[i]
+        state.tau_before[i] = state.tau[i]
 
 
 @compiled
@@ -56,14 +57,13 @@ def correct_gravity(c):
     learned wrongly from a light touch does not pull the arm.
     """
     state = c.state
-    state.gravity_command[:] = c.dynamics.g
     if c.params.mass_uncertainty == 0.0:
         return
     mass_regressor(c.handle, c.dynamics.mass_regressor)
     if c.measurement.has_wrench != 0:
         c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
     state.mass_settled += c.params.settle_share * (state.mass_error - state.mass_settled)
-    state.gravity_command += matvec(c.dynamics.mass_regressor, state.mass_settled)
+    state.gravity_late[:] = matvec(c.dynamics.mass_regressor, state.mass_settled - state.mass_error)
     c.dynamics.g += matvec(c.dynamics.mass_regressor, state.mass_error)
 
 
@@ -78,7 +78,8 @@ def observe(c):
     since = params.dt * (1 + state.bad_ticks)
     known = state.bad_ticks <= LOST_AFTER_TICKS
     p = momentum(dynamics.M, c.measurement.qd)
-    tau_external, rate = np.empty(n), np.empty(n)
+    tau_external, rate, ramp = np.empty(n), np.empty(n), state.tau - state.tau_before
+    state.tau_before[:] = state.tau
     for i in range(n):
         beta = dynamics.g[i] - dynamics.CT_qd[i]
         applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
@@ -95,9 +96,11 @@ def observe(c):
     observer_step(state.observed, params.observer_share, tau_external)
     observer_step(state.observed_trigger, params.trigger_share, tau_external)
     observer_step(state.observed_rate, params.trigger_share, rate)
+    observer_step(state.observed_ramp, params.trigger_share, ramp)
     observer_step(state.residual, params.lowpass_share, state.observed)
     observer_step(state.residual_trigger, params.lowpass_share, state.observed_trigger)
     observer_step(state.momentum_rate, params.lowpass_share, state.observed_rate)
+    observer_step(state.torque_ramp, params.lowpass_share, state.observed_ramp)
 
 
 @compiled
@@ -130,15 +133,15 @@ def part_tool_from_arm(c, J_bar):
 def set_thresholds(c):
     """Give each joint the threshold that what is not known of the arm asks for.
 
-    δ plus a share of friction and of inertial torque, whose model is not exact, plus the standard deviation of the
-    gravity torque that is left after weighing.
+    δ plus a share of friction and of inertial torque, whose model is not exact, plus what a late command is short of,
+    plus the standard deviation of the gravity torque that is left after weighing.
     """
     state, params = c.state, c.params
     friction = joint_friction(params.friction, c.measurement.qd)
     for i in range(state.threshold.shape[0]):
-        unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * abs(
-            state.momentum_rate[i]
-        )
+        inertial = abs(state.momentum_rate[i]) + abs(c.dynamics.CT_qd[i])
+        unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
+        unknown += params.delay_uncertainty_ticks * abs(state.torque_ramp[i])
         state.threshold[i] = params.residual_threshold + unknown + _SIGMAS * state.gravity_sigma[i]
 
 

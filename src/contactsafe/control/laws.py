@@ -161,7 +161,8 @@ def tool_share(F_spring, force, contact_n, push_n):
     Args:
         F_spring: what pulls the tool to its target, (6,), N and N m.
         force: of the environment on the tool, (3,), N.
-        contact_n: least force that counts as contact, N.
+        contact_n: least force that counts as contact, N; from twice as much on the bound is in force, between the two
+            it comes down from infinity.
         push_n: the bound, N.
 
     Returns:
@@ -170,7 +171,7 @@ def tool_share(F_spring, force, contact_n, push_n):
     size = math.sqrt(dot(force, force))
     if size < contact_n:
         return 1.0
-    push = -dot(force, F_spring[:3]) / size
+    push = -dot(force, F_spring[:3]) / size * min((size - contact_n) / max(contact_n, 1e-9), 1.0)
     return 1.0 if push <= push_n else push_n / push
 
 

@@ -2,13 +2,15 @@
 
 import math
 
+import numpy as np
+
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot
+from contactsafe.robot.linalg import dot, matvec
 
 _STILL = 1e-12
 """Speed squared below which an arm stands still, rad²/s²: no torque gives it any power worth the name."""
 
-_FADE_RAD_S = 0.1
+_FADE_RAD_S = 0.4
 """Excess of speed at which nothing pushes a joint on any more, rad/s."""
 
 
@@ -57,17 +59,39 @@ def power_limit(tau_net, qd, tank, power, drain_s):
 
 
 @compiled
-def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness, deceleration, gain):
+def coming_speed(qd, M_inv, tau_net, step_max, dt):
+    """Give the speed that joints will have before the torque that drives them can be taken off, and when that is.
+
+    A command falls by `step_max` a tick at most: until it is gone it goes on accelerating, by half of q̈ on average.
+
+    Args:
+        qd: (n,), rad/s.
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        tau_net: command in force less gravity and Coriolis torque, (n,), N m.
+        step_max: N m per tick.
+        dt: tick, s.
+
+    Returns:
+        Speed, (n,), rad/s; time, (n,), s.
+    """
+    ahead = np.abs(tau_net) * (dt / step_max)
+    return qd + 0.5 * matvec(M_inv, tau_net) * ahead, ahead
+
+
+@compiled
+def joint_stop_torque(tau_net, q, qd, M, speed, ahead, q_min, q_max, qd_max, margin, stiffness, deceleration, gain):
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
-    A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit.
-    What is faster is braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a
+    A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
+    what counts is the speed that it will have before the torque that drives it can be taken off. What is faster is braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a
     spring pushes back.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
         q, qd: (n,), rad and rad/s.
         M: joint inertia, (n, n), kg m².
+        speed: by then, (n,), rad/s; see `coming_speed`.
+        ahead: time until then, (n,), s.
         q_min, q_max: range, (n,), rad.
         qd_max: speed limits, (n,), rad/s.
         margin: rad.
@@ -76,9 +100,9 @@ def joint_stop_torque(tau_net, q, qd, M, q_min, q_max, qd_max, margin, stiffness
         gain: braking per excess of speed, 1/s.
     """
     for i in range(q.shape[0]):
-        way = 1.0 if qd[i] > 0.0 else -1.0
-        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin
-        excess = way * qd[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
+        way = 1.0 if speed[i] > 0.0 else -1.0
+        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin - max(way * qd[i], 0.0) * ahead[i]
+        excess = way * speed[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
         if excess > 0.0:
             on = max(way * tau_net[i], 0.0) * min(excess / _FADE_RAD_S, 1.0)
             tau_net[i] -= way * (on + gain * M[i, i] * excess)

@@ -41,6 +41,7 @@ def safe() -> ControllerConfig:
         residual_threshold=1.5,
         friction_uncertainty=0.3,
         inertia_uncertainty=0.15,
+        delay_uncertainty_ticks=1.5,
         mass_uncertainty=0.06,
         payload_uncertainty_kg=0.12,
         release_s=1.0,

@@ -109,6 +109,7 @@ def state_dtype(n: int) -> np.dtype:
             ("residual_trigger", _f, (n,)),  # N m
             ("tau", _f, (n,)),  # last command sent, N m
             ("friction", _f, (n,)),  # friction torque contained in it, N m
+            ("tau_before", _f, (n,)),  # the command before it, N m
             ("target", target_dtype(n)),  # last good target
             ("mode", _i),
             ("mode_ticks", _i),  # ticks spent in the mode
@@ -122,6 +123,9 @@ def state_dtype(n: int) -> np.dtype:
             ("hold_s", _f),  # time constant with which it falls, s
             ("observed_rate", _f, (n,)),  # momentum's rate of change through the triggering observer's filter, N m
             ("momentum_rate", _f, (n,)),  # the same behind the low-pass, N m
+            ("tool_force", _f, (3,)),  # of the environment on the tool, smoothed, N
+            ("observed_ramp", _f, (n,)),  # change of the command per tick through the triggering observer's filter, N m
+            ("torque_ramp", _f, (n,)),  # the same behind the low-pass, N m
             ("tool_wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
             ("arm_torque", _f, (n,)),  # residual less the tool's share, compensating, N m
             ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
@@ -130,7 +134,7 @@ def state_dtype(n: int) -> np.dtype:
             ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
             ("mass_settled", _f, (n + 1,)),  # of it, what the command believes by now
             ("mass_covariance", _f, (n + 1, n + 1)),
-            ("gravity_command", _f, (n,)),  # gravity torque that the command compensates, N m
+            ("gravity_late", _f, (n,)),  # gravity torque that the command does not compensate yet, negative, N m
             ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
             ("turn", _i),  # joint whose residual is weighed next
             ("ticks", _i),  # since reset

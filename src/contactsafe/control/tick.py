@@ -17,6 +17,7 @@ from contactsafe.control.estimate import (
 from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
+    observer_step,
     push_along,
     stiffness_wrench,
     task_error,
@@ -24,7 +25,7 @@ from contactsafe.control.laws import (
     task_nullspace,
     tool_share,
 )
-from contactsafe.control.limits import joint_stop_torque, limit_torque, passive_step, power_limit
+from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_torque, passive_step, power_limit
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
@@ -100,7 +101,7 @@ def _tick_without_measurement(c):
     state.bad_ticks += 1
     if state.bad_ticks > LOST_AFTER_TICKS:
         state.fault = _LOST
-        tau = state.gravity_command.copy()
+        tau = c.dynamics.g.copy()
         limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step)
         state.tau[:] = tau
     c.output.torque[:] = state.tau
@@ -166,15 +167,16 @@ def _law(c, Lambda, J_bar):
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
     _follow_posture(state, params)
     pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, state.posture_share * params.K_pose * q_error)
-    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
-    share = tool_share(F_spring, _tool_force(c, J_bar), params.tool_contact_n, params.push_tool_n)
+    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd) + state.gravity_late
+    observer_step(state.tool_force, params.probe_share, _tool_force(c, J_bar))
+    share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
         _follow_share(state, params, share)
         tau = state.task_share * pull + damping
     else:
         tau = _contact_law(c, pull, damping, matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque)), N_t - N_ct, share)
-    return tau + dynamics.c + state.gravity_command
+    return tau + dynamics.c + dynamics.g
 
 
 @compiled
@@ -251,14 +253,16 @@ def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     q, qd = c.measurement.q, c.measurement.qd
-    tau -= state.gravity_command + dynamics.c
+    tau -= dynamics.g + dynamics.c
+    in_force = state.tau - state.friction - dynamics.g - dynamics.c
+    speed, ahead = coming_speed(qd, dynamics.M_inv, in_force, params.torque_step, params.dt)
     joint_stop_torque(
-        tau, q, qd, dynamics.M, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        tau, q, qd, dynamics.M, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
         params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
     )  # fmt: skip
     tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
-    tau += state.gravity_command
+    tau += dynamics.g
     friction = np.zeros(q.shape[0])
     if params.friction_compensation != 0:
         friction = joint_friction(params.friction, qd)
@@ -266,7 +270,7 @@ def _finish(c, tau):
     out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
     state.tau[:] = tau
     state.friction[:] = friction
-    given = dot(tau - friction - state.gravity_command, qd)
+    given = dot(tau - friction - dynamics.g, qd)
     state.tank_j = min(state.tank_j + params.dt * (params.tank_power_w - given), params.tank_j)
     out.torque[:] = tau
     out.residual[:] = state.residual
