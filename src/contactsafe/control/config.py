@@ -39,7 +39,8 @@ class ControllerConfig:
         tool_radius_m: without a force sensor: no touch of the tool is further than this from the tool point, m.
         tool_moment_nm: without a force sensor: moment at the tool that noise and model errors may show, N m.
         dwell_s: t_c, least time in contact mode, s.
-        release_s: time the residual must have stayed below δ before contact mode ends, s.
+        release_s: time the residual must have stayed below a share of δ before contact mode ends, s.
+        release_fraction: that share.
         recover_s: time constant with which the task's pull comes back after it gave way to a contact, s; 0 for at once.
         hold_recover_s: the same while something pushes the arm, s.
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
@@ -98,6 +99,7 @@ class ControllerConfig:
     tool_moment_nm: float = 2.0
     dwell_s: float = 0.05
     release_s: float = 0.0
+    release_fraction: float = 1.0
     recover_s: float = 0.0
     hold_recover_s: float = 0.0
     null_damping: float = 0.0

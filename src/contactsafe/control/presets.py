@@ -45,6 +45,7 @@ def safe() -> ControllerConfig:
         mass_uncertainty=0.06,
         payload_uncertainty_kg=0.12,
         release_s=1.0,
+        release_fraction=0.5,
         recover_s=1.0,
         null_damping=10.0,
         contact_damping=5.0,

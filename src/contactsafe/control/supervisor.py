@@ -21,10 +21,10 @@ _LEVER_SHARE = 0.2
 
 
 @compiled
-def _link_in_contact(alarm, threshold):
-    """Give the furthest joint from the base whose torque exceeds its threshold, 1 … n; 0 for none."""
+def _link_in_contact(alarm, threshold, share):
+    """Give the furthest joint from the base whose torque exceeds a share of its threshold, 1 … n; 0 for none."""
     for i in range(alarm.shape[0] - 1, -1, -1):
-        if abs(alarm[i]) > threshold[i]:
+        if abs(alarm[i]) > share * threshold[i]:
             return i + 1
     return 0
 
@@ -33,9 +33,10 @@ def _link_in_contact(alarm, threshold):
 def supervise(c):
     """Choose the mode, with dwell and release; remember the contact's direction; tell pusher from obstacle."""
     state, params = c.state, c.params
-    link = _link_in_contact(state.alarm, state.threshold)
+    link = _link_in_contact(state.alarm, state.threshold, 1.0)
+    left = link if state.mode == FREE else _link_in_contact(state.alarm, state.threshold, params.release_fraction)
     state.mode_ticks += 1
-    state.quiet_ticks = 0 if link != 0 else state.quiet_ticks + 1
+    state.quiet_ticks = 0 if left != 0 else state.quiet_ticks + 1
     if state.mode == FREE:
         if link != 0 and params.contact_aware != 0:
             _enter(state, CONTACT)
