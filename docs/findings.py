@@ -438,8 +438,8 @@ def pusher_or_obstacle() -> None:
                     found.setdefault(name, []).append([config is SAFE, *_verdicts(trace)])
     for name, rows in found.items():
         fast, safe = (np.array([row[1:] for row in rows if row[0] == which]).sum(axis=0) for which in (False, True))
-        say(f"{name:24s} taken for a pusher by its work: {fast[1]} of {fast[0]} (no bound), {safe[1]} of {safe[0]} (safe); "
-            f"by giving way: {safe[2]} of {safe[0]}")  # fmt: skip
+        by_work = f"{fast[1]} of {fast[0]} (no bound), {safe[1]} of {safe[0]} (safe)"
+        say(f"{name:24s} taken for a pusher by its work: {by_work}; by giving way: {safe[2]} of {safe[0]}")
 
 
 def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarray]:
@@ -535,9 +535,8 @@ def weight_of_the_links() -> None:
         found = [trial.metrics for trial in alarm_trials(ARM, name, config, strokes)]
         alarms, lasted = sum(f["false_alarms"] for f in found), sum(f["false_contact_s"] for f in found)
         minutes = sum(f["minutes"] for f in found)
-        say(
-            f"{name:19s} masses ± 10 %, {minutes:.1f} min without contact: {alarms:.0f} false contacts, {lasted:.0f} s of them"
-        )
+        counted = f"{alarms:.0f} false contacts, {lasted:.0f} s of them"
+        say(f"{name:19s} masses ± 10 %, {minutes:.1f} min without contact: {counted}")
 
 
 def blow_of_a_fixed_thing() -> None:
