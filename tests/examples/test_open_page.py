@@ -1,0 +1,57 @@
+"""The page on what the paper leaves open: every finding has a function, and what the page quotes is what it prints."""
+
+import importlib.util
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from contactsafe import ControllerConfig
+from contactsafe.experiments.registry import ENTRIES
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "concepts" / "open.md").read_text(encoding="utf-8")
+QUOTED = dict(re.findall(r"^python docs/findings\.py (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
+WITHOUT_FIGURES = {"9"}
+
+
+@pytest.fixture(scope="module")
+def findings():
+    spec = importlib.util.spec_from_file_location("findings", DOCS / "findings.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_finding_of_the_page_has_a_function_and_a_figure(findings):
+    claimed = set(re.findall(r"^\*\*(\d+)\.\*\*", PAGE, re.MULTILINE))
+    assert claimed - WITHOUT_FIGURES == set(QUOTED) == {str(number) for number in findings.FINDINGS}
+    assert all(text.strip() for text in QUOTED.values())
+
+
+def test_the_table_lists_them_all():
+    assert set(re.findall(r"^\| \[(\d+)\]\(#", PAGE, re.MULTILINE)) == set(QUOTED)
+
+
+@pytest.mark.parametrize("number", ["2", "10"])
+def test_figures_are_what_the_program_prints(findings, number, capsys):
+    assert findings.main([number]) == 0
+    printed = capsys.readouterr().out.splitlines()[1:]
+    assert [line.strip() for line in printed] == QUOTED[number].splitlines()
+
+
+def test_an_unknown_finding_is_refused(findings, capsys):
+    assert findings.main(["9"]) == 2
+    assert "give numbers out of 1, 2, " in capsys.readouterr().err
+
+
+def test_experiments_it_sends_to_are_there():
+    named = set(re.findall(r"`contactsafe experiment ([a-z-]+)", PAGE))
+    assert len(named) > 2
+    assert named <= set(ENTRIES)
+
+
+def test_page_names_no_parameter_that_is_not_there():
+    named = set(re.findall(r"`([a-z]+_[a-z_0-9]+)`", PAGE))
+    assert named <= {field.name for field in fields(ControllerConfig)}
