@@ -71,7 +71,11 @@ def main() -> None:
     controller.reset(arrays[0][0])
     replay(controller._records, *arrays, modes)
     contact = np.flatnonzero(modes == 1)
-    parts = {"free": slice(0, contact[0]), "found": slice(contact[0], contact[0] + 1), "contact": slice(contact[0] + 1, contact[0] + AFTER)}
+    parts = {
+        "free": slice(0, contact[0]),
+        "found": slice(contact[0], contact[0] + 1),
+        "contact": slice(contact[0] + 1, contact[0] + AFTER),
+    }
     best = dict.fromkeys(parts, np.inf)
     for _ in range(REPEATS):
         controller.reset(arrays[0][0])
