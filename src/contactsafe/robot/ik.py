@@ -1,6 +1,7 @@
 """Inverse kinematics: a compiled solver for the 60 Hz path, and a patient one that starts from anywhere."""
 
 import math
+from functools import cached_property
 import tempfile
 from pathlib import Path
 
@@ -47,7 +48,6 @@ class InverseKinematics:
         middle = (low + high) / 2
         spread = np.random.default_rng(0).uniform(low, high, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
-        self._reference = trac_ik(arm)
 
     def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
         """Find joint positions within the limits that put the tool at a pose.
@@ -86,6 +86,10 @@ class InverseKinematics:
             f"{_error_words(*nearest)} away, allowed is {_error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
             "move it towards the arm, turn it, or give another q_seed"
         )
+
+    @cached_property
+    def _reference(self):
+        return trac_ik(self._arm)  # only where the compiled solver fails: building it takes 10 ms
 
     def _from_seed(self, position, quat, seed):
         q = np.empty(self._arm.n)
