@@ -4,7 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.robot.worlds import OWN_SCENE
 
+from contactsafe.robot import robots
 from contactsafe.robot.contact import best_point, contact_lever, skin_torque
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
@@ -117,6 +119,47 @@ def test_random_contacts_are_found_where_they_are(request, name):
     assert np.mean(right) > 0.70
     assert np.mean(near) > 0.88
     assert np.mean(lever) > 0.85
+
+
+def test_skin_of_geoms_finds_contacts_as_often_as_that_of_capsules(panda):
+    """The Panda read from MJCF: of 500 contacts 79 % on the very link, 96 % there or next to it, lever right in 94 %."""
+    read, rng = robots.from_mjcf(panda.model, site=panda.site), np.random.default_rng(0)
+    right, near, lever = np.zeros((500, 2)), np.zeros((500, 2)), np.zeros((500, 2))
+    for k in range(500):
+        q = rng.uniform(panda.q_min, panda.q_max)
+        link, point, normal = random_contact(panda, rng)
+        torque = Placed(panda, q).torque(link, point, -normal)
+        for i, arm in enumerate((panda, read)):
+            found, length = Placed(arm, q).search(20.0 * torque)
+            right[k, i], near[k, i] = found == link, abs(found - link) <= 1
+            lever[k, i] = 0.5 < length / np.linalg.norm(torque) < 2.0
+    for share in (right, near, lever):
+        of_capsules, of_geoms = share.mean(axis=0)
+        assert of_geoms > of_capsules - 0.05
+
+
+def test_contacts_of_a_six_joint_arm_are_found_where_they_are():
+    """The arm of the examples, sides of links 4 to 6, 300 postures: MEASURED"""
+    model = mujoco.MjModel.from_xml_string(OWN_SCENE)
+    arm, rng = robots.from_mjcf(model, site="tip"), np.random.default_rng(0)
+    start = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, start)
+    found = []
+    for _ in range(300):
+        placed, link = Placed(arm, rng.uniform(arm.q_min, arm.q_max)), int(rng.integers(4, 7))
+        geom = model.body(f"wrist{link - 3}").geomadr[0]
+        radius, half, _ = model.geom_size[geom]
+        R, turn = start.geom_xmat[geom].reshape(3, 3), rng.uniform(0, 2 * np.pi)
+        side = np.array([np.cos(turn), np.sin(turn), 0.0])
+        point = start.geom_xpos[geom] + R @ (radius * side + [0.0, 0.0, rng.uniform(-half, half)])
+        torque = placed.torque(link, point - start.xanchor[link - 1], -R @ side)
+        name, lever = placed.search(20.0 * torque)
+        found.append((name == link, abs(name - link) <= 1, 0.5 < lever / np.linalg.norm(torque) < 2.0))
+    right, near, lever = np.mean(found, axis=0)
+    print(right,near,lever)
+    assert right > 0.70
+    assert near > 0.88
+    assert lever > 0.85
 
 
 def test_lever_guessed_from_the_link_is_that_of_its_centre_where_the_push_is_there(panda):

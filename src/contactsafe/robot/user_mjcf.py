@@ -19,6 +19,7 @@ from contactsafe.robot.arm import Arm, finite_array, finite_range
 from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
 from contactsafe.robot.facts import Inertia
 from contactsafe.robot.rotation import matrix_to_quat
+from contactsafe.robot.skin import geom_skin
 
 _BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
@@ -85,6 +86,7 @@ def from_mjcf(
         torque_rate_max=float(torque_rate_max),
         friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
         home=_home(key_home if home is None else home, q_min, q_max),
+        skin=geom_skin(model, data, _shown_by(model, chain), data.xanchor[chain]),
     )
 
 
@@ -142,6 +144,18 @@ def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
     link_of = np.zeros(model.nbody, dtype=int)
     for body in range(1, model.nbody):
         link_of[body] = moved_by.get(body, link_of[model.body_parentid[body]])
+    return link_of
+
+
+def _shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
+    """Tell whose skin each body's surface is, (nbody,): the link's it is part of, but what the last one carries is tool.
+
+    Only where the last link's own body shows nothing, what it carries is taken for the link.
+    """
+    link_of, last = _link_of(model, chain), model.jnt_bodyid[chain[-1]]
+    if model.body_geomnum[last] > 0:
+        link_of[link_of == len(chain)] = 0
+        link_of[last] = len(chain)
     return link_of
 
 
