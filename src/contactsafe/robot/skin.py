@@ -14,12 +14,12 @@ SKIN_COLUMNS = 7
 _ALONG, _AROUND = 5, 12
 
 _POINTS = 480
-"""Of an arm made of geoms, as many as the Panda has of capsules: the search for a contact takes its time in the tick."""
+"""Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
 
 _STARTS, _WAYS = 1000, 5
 """Of the lines that look for a link's surface; few ways from a start, or the points would huddle before it."""
 
-_TURN_M = 0.05
+_TURN_M = 0.02
 """Points whose normals differ by 1 count as so far apart: a thin plate has two sides."""
 
 

@@ -26,6 +26,9 @@ _HINGE = mujoco.mjtJoint.mjJNT_HINGE
 _NOTHING = 1e-12
 """Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
 
+_LEVER_DOUBTED = 0.02
+"""Of `Arm.lever_doubted`, m. Many arms are bent in one plane, where a push from the side fits points everywhere."""
+
 
 def from_mjcf(
     scene: str | os.PathLike | mujoco.MjModel,
@@ -41,8 +44,10 @@ def from_mjcf(
 
     The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
     of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
-    Base pose, gravity and rotor inertia are the model's. Damping, dry friction and springs of joints are left out: the
-    controller feels them as external torque, so give `friction`, or keep them below its threshold.
+    Base pose, gravity and rotor inertia are the model's. The skin is what the colliding geoms of links 2 … n show, or
+    all geoms of a link where none collides, without what the last link carries. Damping, dry friction and springs of
+    joints are left out: the controller feels them as external torque, so give `friction`, or keep them below its
+    threshold.
 
     Args:
         scene: path of the MJCF file, or the model compiled from it.
@@ -87,6 +92,7 @@ def from_mjcf(
         friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
         home=_home(key_home if home is None else home, q_min, q_max),
         skin=geom_skin(model, data, _shown_by(model, chain), data.xanchor[chain]),
+        lever_doubted=_LEVER_DOUBTED,
     )
 
 
@@ -148,7 +154,7 @@ def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
 
 
 def _shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    """Tell whose skin each body's surface is, (nbody,): the link's it is part of, but what the last one carries is tool.
+    """Tell whose skin each body's surface is, (nbody,): its link's, but what the last link carries is tool, 0.
 
     Only where the last link's own body shows nothing, what it carries is taken for the link.
     """
