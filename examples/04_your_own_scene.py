@@ -45,7 +45,7 @@ def main() -> dict[str, float]:
     lasting = {}
     for name, config in (("vices", cs.presets.vices()), ("safe", cs.presets.safe())):
         peak, lasting[name], link = collide(config)
-        found = f"found on link {link} or beyond" if link else "not found"
+        found = f"found on link {link}" if link else "not found"
         print(f"{name}: contact {found}; the box feels {peak:.0f} N at the blow, {lasting[name]:.0f} N in the end")
     return lasting
 

@@ -27,6 +27,15 @@ def six():
     return Scene(model, robots.from_mjcf(model, site="tip"), "forearm")
 
 
+def six_without_geoms():
+    """Nothing is known of its surface: where it is touched must be guessed from the joints alone."""
+    known = six().arm
+    arm = robots.from_mjcf(known.model, site="tip", home=known.home)
+    assert len(known.skin) == 480
+    assert len(arm.skin) == 0
+    return Scene(arm.model, arm, "link3")
+
+
 def fr3():
     return Scene(robots.fr3().model, robots.fr3(), "link5")
 
@@ -94,7 +103,11 @@ def test_goes_where_it_is_told(scene):
         (panda_in_a_cell, (0.0, 25.0, 0.0)),
         (panda_in_a_cell, (0.0, 0.0, -25.0)),
         (six, (0.0, 25.0, 0.0)),
+        (six, (0.0, -25.0, 0.0)),
+        (six, (-25.0, 0.0, 0.0)),
         (six, (0.0, 0.0, -25.0)),
+        (six_without_geoms, (0.0, 25.0, 0.0)),
+        (six_without_geoms, (0.0, 0.0, -25.0)),
     ],
 )
 def test_holds_the_tool_under_a_push_on_its_forearm(make, push):

@@ -1,10 +1,14 @@
 """Points of an arm's skin, and finding on it where something touches."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.robot.worlds import OWN_SCENE
 
+from contactsafe.robot import robots
 from contactsafe.robot.contact import best_point, contact_lever, skin_torque
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
@@ -97,6 +101,21 @@ def test_search_in_parts_is_the_search_at_once(panda):
             assert size == 0.0 or scratch @ torque / size <= fit + 1e-12
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_points_that_explain_a_torque_alike_the_one_that_takes_less_force_is_found(side):
+    """Pushed sideways, an arm that lies in one plane feels its first joint alone, wherever it is touched.
+
+    A point beside that joint's axis fits best by a hair, and would take 400 N where 25 N push the wrist.
+    """
+    arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(OWN_SCENE), site="tip")
+    believing = replace(arm, lever_doubted=0.0)
+    wrist = arm.model.body_ipos[arm.model.body("link4").id]
+    torque = Placed(arm, arm.home).torque(4, wrist, np.array([0.0, side, 0.0]))
+    torque[1:] = 0.0
+    assert Placed(arm, arm.home).search(torque)[1] > 0.2
+    assert Placed(believing, arm.home).search(torque)[1] < 0.1
+
+
 @pytest.mark.parametrize("name", ["panda", "fr3"])
 def test_random_contacts_are_found_where_they_are(request, name):
     """Without noise, links 4 to 7, 500 postures: 80 % on the very link and 93 % there or next to it, measured.
@@ -117,6 +136,46 @@ def test_random_contacts_are_found_where_they_are(request, name):
     assert np.mean(right) > 0.70
     assert np.mean(near) > 0.88
     assert np.mean(lever) > 0.85
+
+
+def test_skin_of_geoms_finds_contacts_as_often_as_that_of_capsules(panda):
+    """The Panda read from MJCF: 78 % on the very link, 97 % there or next to it, lever arm right in 94 %, measured."""
+    read, rng = robots.from_mjcf(panda.model, site=panda.site), np.random.default_rng(0)
+    right, near, lever = np.zeros((500, 2)), np.zeros((500, 2)), np.zeros((500, 2))
+    for k in range(500):
+        q = rng.uniform(panda.q_min, panda.q_max)
+        link, point, normal = random_contact(panda, rng)
+        torque = Placed(panda, q).torque(link, point, -normal)
+        for i, arm in enumerate((panda, read)):
+            found, length = Placed(arm, q).search(20.0 * torque)
+            right[k, i], near[k, i] = found == link, abs(found - link) <= 1
+            lever[k, i] = 0.5 < length / np.linalg.norm(torque) < 2.0
+    for share in (right, near, lever):
+        of_capsules, of_geoms = share.mean(axis=0)
+        assert of_geoms > of_capsules - 0.05
+
+
+def test_contacts_of_a_six_joint_arm_are_found_where_they_are():
+    """The arm of the examples, sides of links 4 to 6, 300 postures: 85 %, 94 %, 98 %, measured."""
+    model = mujoco.MjModel.from_xml_string(OWN_SCENE)
+    arm, rng = robots.from_mjcf(model, site="tip"), np.random.default_rng(0)
+    start = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, start)
+    found = []
+    for _ in range(300):
+        placed, link = Placed(arm, rng.uniform(arm.q_min, arm.q_max)), int(rng.integers(4, 7))
+        geom = model.body(f"wrist{link - 3}").geomadr[0]
+        radius, half, _ = model.geom_size[geom]
+        R, turn = start.geom_xmat[geom].reshape(3, 3), rng.uniform(0, 2 * np.pi)
+        side = np.array([np.cos(turn), np.sin(turn), 0.0])
+        point = start.geom_xpos[geom] + R @ (radius * side + [0.0, 0.0, rng.uniform(-half, half)])
+        torque = placed.torque(link, point - start.xanchor[link - 1], -R @ side)
+        name, lever = placed.search(20.0 * torque)
+        found.append((name == link, abs(name - link) <= 1, 0.5 < lever / np.linalg.norm(torque) < 2.0))
+    right, near, lever = np.mean(found, axis=0)
+    assert right > 0.75
+    assert near > 0.88
+    assert lever > 0.90
 
 
 def test_lever_guessed_from_the_link_is_that_of_its_centre_where_the_push_is_there(panda):

@@ -67,8 +67,8 @@ class ControllerConfig:
         joint_deceleration: a joint moves no faster than this can stop it before the margin, rad/s².
         joint_brake: braking of a joint that is too fast, per excess of speed and inertia, 1/s.
         joint_speed_fraction: share of the arm's joint speed limits that is used.
-        manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped.
-        manipulability_damping: λ² at a singularity.
+        manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped, as a share of the arm's best.
+        manipulability_damping: λ² at a singularity, as a share of the sixth root of that best.
         pull_max_m_s2: largest acceleration K e that pulls the tool to its target, m/s².
         pull_max_rad_s2: the same of its turning, rad/s².
         posture_error_max_rad: the posture is pulled as if it were no further away than this, rad.
@@ -126,8 +126,8 @@ class ControllerConfig:
     joint_deceleration: float = 8.0
     joint_brake: float = 50.0
     joint_speed_fraction: float = 0.9
-    manipulability_floor: float = 1e-2
-    manipulability_damping: float = 0.05
+    manipulability_floor: float = 0.007
+    manipulability_damping: float = 0.047
     pull_max_m_s2: float = math.inf
     pull_max_rad_s2: float = math.inf
     posture_error_max_rad: float = math.inf

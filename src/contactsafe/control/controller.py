@@ -50,7 +50,8 @@ class Contact(NamedTuple):
 
     Attributes:
         in_contact: whether the contact-aware law is in force.
-        link: furthest link whose joint residual exceeds the threshold, 1 … n; 0 for none.
+        link: found in contact on the arm's skin, or without one the furthest whose joint residual exceeds the
+            threshold, 1 … n; 0 for none.
         holding: whether the contact was found to push the arm rather than to stand in its way.
         torque: estimated joint torque of the contact, (n,), N m (the triggering residual).
     """

@@ -12,6 +12,7 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.control.laws import observer_gain
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.dynamics import dynamics_dtype, handle_dtype
+from contactsafe.robot.mobility import best_mobility
 
 _f = np.float64
 _i = np.int64
@@ -206,6 +207,12 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["trigger_share"] = observer_gain(config.trigger_gain, dt)
     params["observer_share"] = observer_gain(config.observer_gain, dt)
     params["lowpass_share"] = observer_gain(2.0 * math.pi * config.residual_cutoff_hz, dt)
+    mobility = best_mobility(arm)
+    params["manipulability_damping"] *= mobility.mean
+    # An arm that can never move its tool every way is singular wherever it is.
+    params["manipulability_floor"] *= mobility.mean**6
+    if mobility.directions < 6:
+        params["manipulability_floor"] = math.inf
     params["stiffness_min"], params["stiffness_max"] = config.stiffness_range
     params["damping_min"], params["damping_max"] = config.damping_range
     params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt

@@ -34,15 +34,16 @@ class NominalModel:
         handle: `handle_dtype` record for compiled code.
     """
 
-    def __init__(self, model: mujoco.MjModel, site: str, skin: np.ndarray):
+    def __init__(self, model: mujoco.MjModel, site: str, skin: np.ndarray, lever_doubted: float):
         self._model = model
         self._data = mujoco.MjData(model)
         self._site, self._skin = site, np.ascontiguousarray(skin, dtype=float)
-        self.handle = make_handle(model, self._data, site, self._skin)[0]
+        self._lever_doubted = lever_doubted
+        self.handle = make_handle(model, self._data, site, self._skin, lever_doubted)[0]
 
     def __reduce__(self):
         """Pickle by building anew: addresses mean nothing in another process."""
-        return NominalModel, (self._model, self._site, self._skin)
+        return NominalModel, (self._model, self._site, self._skin, self._lever_doubted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,8 @@ class Arm:
         facts: what the model was generated from; None for a user's own.
         tool: what the flange carries; None for a user's own.
         skin: points of the links' surface, (P, 7), rows as in `contactsafe.robot.skin`; empty where unknown.
+        lever_doubted: lever arm at which a point of the skin is hardly believed to be a contact, m: of points that
+            explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
     """
 
     name: str
@@ -77,6 +80,7 @@ class Arm:
     facts: ArmFacts | None = None
     tool: Tool | None = None
     skin: np.ndarray = field(default_factory=lambda: np.zeros((0, SKIN_COLUMNS)))
+    lever_doubted: float = 0.0
 
     @property
     def n(self) -> int:
@@ -101,7 +105,7 @@ class Arm:
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site, self.skin)
+        return NominalModel(self.model, self.site, self.skin, self.lever_doubted)
 
     def joint_vector(self, value, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.

@@ -2,7 +2,8 @@
 
 A contact without friction pushes along the surface's normal, so each point of the skin has one direction of joint
 torque, t = J_pᵀ n; the point whose t is nearest in angle to the torque found explains it best (Manuelli & Tedrake 2016
-search the same way with particles). What gives no torque, near a joint's axis, cannot be told apart by anybody.
+search the same way with particles). Where an arm doubts short lever arms, of points that explain it alike the one that
+takes less force. What gives no torque, near a joint's axis, cannot be told apart by anybody.
 """
 
 import math
@@ -95,17 +96,18 @@ def best_point(handle, start, stop, torque, scratch, best, best_fit):
         torque: of the contact on the arm, (n,), N m.
         scratch: (n,); overwritten.
         best: the best point of those searched before, −1 for none.
-        best_fit: its fit, the cosine between its torque and the one found.
+        best_fit: its fit, the cosine between its torque and the one found, less where its lever arm is short.
 
     Returns:
         The best point so far and its fit.
     """
+    doubted = handle.lever_doubted * handle.lever_doubted
     for index in range(start, stop):
         skin_torque(handle, index, scratch)
         along = dot(scratch, torque)
         if along <= 0.0:
             continue
-        fit = along / math.sqrt(dot(scratch, scratch) * dot(torque, torque))
+        fit = along / math.sqrt((dot(scratch, scratch) + doubted) * dot(torque, torque))
         if fit > best_fit:
             best, best_fit = index, fit
     return best, best_fit

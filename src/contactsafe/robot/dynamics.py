@@ -35,6 +35,7 @@ handle_dtype = np.dtype(
         ("tool_body", np.int64),
         ("nbody", np.int64),
         ("gravity", np.float64, (3,)),
+        ("lever_doubted", np.float64),
     ]
 )
 """Where a compiled function finds one nominal model: addresses of MjModel, MjData and its arrays; body numbers."""
@@ -60,16 +61,20 @@ def dynamics_dtype(n: int) -> np.dtype:
     )
 
 
-def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str, skin: np.ndarray) -> np.ndarray:
+def make_handle(
+    model: mujoco.MjModel, data: mujoco.MjData, site: str, skin: np.ndarray, lever_doubted: float
+) -> np.ndarray:
     """Fill a handle for a model of one serial arm, array of one `handle_dtype` record.
 
-    The caller keeps `model`, `data` and `skin` (rows as in `contactsafe.robot.skin`) alive while the handle is used.
+    The caller keeps `model`, `data` and `skin` (rows as in `contactsafe.robot.skin`) alive while the handle is used;
+    `lever_doubted`, m, is the arm's.
     """
     handle = np.zeros(1, dtype=handle_dtype)
     handle["model"], handle["data"] = model._address, data._address
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
     handle["skin"], handle["skin_points"] = skin.ctypes.data, len(skin)
+    handle["lever_doubted"] = lever_doubted
     handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id

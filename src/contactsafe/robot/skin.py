@@ -1,7 +1,9 @@
 """The skin of an arm: points of its surface where something may touch it, and the way that thing can push there."""
 
+import copy
 import math
 
+import mujoco
 import numpy as np
 
 from contactsafe.robot.facts import ArmFacts, Capsule
@@ -10,6 +12,15 @@ SKIN_COLUMNS = 7
 """Link 1 … n, point x y z in the link's frame, m, outward normal x y z."""
 
 _ALONG, _AROUND = 5, 12
+
+_POINTS = 480
+"""Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
+
+_STARTS, _WAYS = 1000, 5
+"""Of the lines that look for a link's surface; few ways from a start, or the points would huddle before it."""
+
+_TURN_M = 0.02
+"""Points whose normals differ by 1 count as so far apart: a thin plate has two sides."""
 
 
 def capsule_skin(facts: ArmFacts) -> np.ndarray:
@@ -38,3 +49,73 @@ def _capsule_points(link: int, capsule: Capsule) -> np.ndarray:
             normal = math.cos(turn) * side + math.sin(turn) * other
             rows.append([link, *(start + share * (end - start) + capsule.radius * normal), *normal])
     return np.array(rows)
+
+
+def geom_skin(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray, origins: np.ndarray) -> np.ndarray:
+    """Sample the geoms of an arm's links in a scene, (P, 7) rows as in `SKIN_COLUMNS`; P is at most 480.
+
+    Of each link those geoms that can collide, or all of them where none can. A link without geoms has no points, and
+    link 1 is left out as in `capsule_skin`.
+
+    Args:
+        model: of the scene.
+        data: of it, with all bodies in place.
+        link_of: link that each body is part of, 1 … n, 0 for what is none of the links', (nbody,).
+        origins: of the links' frames, whose axes are the world's, (n, 3), m.
+    """
+    seen = copy.copy(model)
+    seen.geom_matid[:], seen.geom_rgba[:, 3] = -1, 1.0  # rays pass through what is transparent
+    found = {}
+    for link in range(2, len(origins) + 1):
+        geoms = np.flatnonzero(link_of[model.geom_bodyid] == link)
+        solid = geoms[(model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)]
+        points = _surface(seen, data, solid if solid.size else geoms)
+        if len(points):
+            found[link] = points
+    rows = [np.zeros((0, SKIN_COLUMNS))]
+    for link, points in found.items():
+        points = _spread(points, _POINTS // len(found))
+        points[:, :3] -= origins[link - 1]
+        rows.append(np.insert(points, 0, link, axis=1))
+    return np.concatenate(rows)
+
+
+def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> np.ndarray:
+    """Find where random lines first meet some geoms: points and outward normals in world axes, (H, 6).
+
+    Lines between random points of a sphere come from everywhere alike: they meet all of a convex surface with the same
+    chance per area (Crofton), and never first what lies within another geom. `model` loses its geoms' groups.
+    """
+    if not geoms.size:
+        return np.zeros((0, 6))
+    model.geom_group[:] = 1
+    model.geom_group[geoms] = 0
+    group = np.array([1, 0, 0, 0, 0, 0], dtype=np.uint8)
+    centre = data.geom_xpos[geoms].mean(axis=0)
+    radius = 1.01 * np.max(np.linalg.norm(data.geom_xpos[geoms] - centre, axis=1) + model.geom_rbound[geoms])
+    rng = np.random.default_rng(0)
+    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _WAYS))
+    ways = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
+    distances, normals = np.zeros((_STARTS, _WAYS)), np.zeros((_STARTS, 3 * _WAYS))
+    geom = np.zeros(_WAYS, dtype=np.int32)
+    for start, way, distance, normal in zip(starts, ways, distances, normals, strict=True):
+        mujoco.mj_multiRay(model, data, start[0], way.ravel(), group, True, -1, geom, distance, normal, _WAYS, np.inf)
+    normals = normals.reshape(ways.shape)
+    normals *= -np.sign(np.sum(normals * ways, axis=2, keepdims=True))  # faces of a mesh may be wound either way
+    return np.concatenate([starts + distances[..., None] * ways, normals], axis=2)[distances >= 0.0]
+
+
+def _on_sphere(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+    """Draw points of the unit sphere, (*shape, 3)."""
+    points = rng.normal(size=(*shape, 3))
+    return points / np.linalg.norm(points, axis=2, keepdims=True)
+
+
+def _spread(points: np.ndarray, count: int) -> np.ndarray:
+    """Choose points evenly, each the furthest from those chosen before it: at most `count` of (H, 6)."""
+    place = points * np.repeat([1.0, _TURN_M], 3)
+    chosen, gap = [0], np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        gap = np.minimum(gap, np.linalg.norm(place - place[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(gap)))
+    return points[chosen]

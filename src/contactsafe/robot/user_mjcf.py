@@ -19,11 +19,15 @@ from contactsafe.robot.arm import Arm, finite_array, finite_range
 from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
 from contactsafe.robot.facts import Inertia
 from contactsafe.robot.rotation import matrix_to_quat
+from contactsafe.robot.skin import geom_skin
 
 _BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
 _NOTHING = 1e-12
 """Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
+
+_LEVER_DOUBTED = 0.02
+"""Of `Arm.lever_doubted`, m. Many arms are bent in one plane, where a push from the side fits points everywhere."""
 
 
 def from_mjcf(
@@ -40,8 +44,10 @@ def from_mjcf(
 
     The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
     of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
-    Base pose, gravity and rotor inertia are the model's. Damping, dry friction and springs of joints are left out: the
-    controller feels them as external torque, so give `friction`, or keep them below its threshold.
+    Base pose, gravity and rotor inertia are the model's. The skin is what the colliding geoms of links 2 … n show, or
+    all geoms of a link where none collides, without what the last link carries. Damping, dry friction and springs of
+    joints are left out: the controller feels them as external torque, so give `friction`, or keep them below its
+    threshold.
 
     Args:
         scene: path of the MJCF file, or the model compiled from it.
@@ -85,6 +91,8 @@ def from_mjcf(
         torque_rate_max=float(torque_rate_max),
         friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
         home=_home(key_home if home is None else home, q_min, q_max),
+        skin=geom_skin(model, data, _shown_by(model, chain), data.xanchor[chain]),
+        lever_doubted=_LEVER_DOUBTED,
     )
 
 
@@ -142,6 +150,18 @@ def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
     link_of = np.zeros(model.nbody, dtype=int)
     for body in range(1, model.nbody):
         link_of[body] = moved_by.get(body, link_of[model.body_parentid[body]])
+    return link_of
+
+
+def _shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
+    """Tell whose skin each body's surface is, (nbody,): its link's, but what the last link carries is tool, 0.
+
+    Only where the last link's own body shows nothing, what it carries is taken for the link.
+    """
+    link_of, last = _link_of(model, chain), model.jnt_bodyid[chain[-1]]
+    if model.body_geomnum[last] > 0:
+        link_of[link_of == len(chain)] = 0
+        link_of[last] = len(chain)
     return link_of
 
 
