@@ -1,8 +1,8 @@
 """Inverse kinematics: a compiled solver for the 60 Hz path, and a patient one that starts from anywhere."""
 
 import math
-from functools import cached_property
 import tempfile
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
