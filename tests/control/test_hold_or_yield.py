@@ -137,17 +137,16 @@ def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_there_is_no_second_blow_of_an_obstacle_that_stays(panda, stiffness):
-    """The arm comes back to it every 1.5 s or so; with 0.54 and 0.65 of the torque of the first time, measured."""
+    """It stays in sight, and the arm leans on it gently: after the first second with less than half of the blow."""
     torques, commands, contacts = [], [], []
     for out, _, plant in collision(panda, stiffness, seconds=7.0):
         torques.append(spring_torque(plant))
         commands.append(out.torque)
         contacts.append(out.contact.in_contact)
     assert np.abs(np.diff(commands, axis=0)).max() <= 1.0
-    contacts = np.array(contacts)
-    ends = np.flatnonzero(contacts[:-1] & ~contacts[1:])
-    assert len(ends) >= 2
-    assert max(torques[ends[0] :]) < 0.75 * max(torques[: ends[0]])
+    found = contacts.index(True)
+    assert all(contacts[found:])
+    assert max(torques[found + 1000 :]) < 0.5 * max(torques)
 
 
 def released(arm, body, force):

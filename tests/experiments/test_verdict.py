@@ -21,6 +21,7 @@ def trial(controller, seed, peak, steady=0.0, met=1.0, stiffness=1e4, detect=NAN
         "mode_switches": 0.0,
         "limit_touches": 0.0,
         "link": 5.0,
+        "speed_m_s": 0.2,
     }
     return Trial("sweep in free air", controller, seed, metrics | more, plant)
 
@@ -106,3 +107,15 @@ def test_worst_trials_lead_by_newtons_above_the_baseline_each_seed_once():
     assert [row["seed"] for row in rows] == list(range(14, 14 - WORST, -1))
     assert rows[0]["scene"] == "sweep in free air, clean plant"
     assert (rows[0]["peak (N), safe"], rows[0]["peak (N), vices"], rows[0]["replay"]) == (81.0, 50.0, "again 14")
+
+
+def test_sweeps_are_told_apart_from_holds():
+    """A hold is bumped into: what is pressed then is mostly the blow, whatever the controller."""
+    mine = [
+        trial("safe", 0, 10.0, 2.0),
+        trial("safe", 1, 30.0, 3.0, speed_m_s=0.0),
+        trial("safe", 2, 30.0, speed_m_s=0.0),
+    ]
+    theirs = [trial("vices", 0, 40.0, 8.0), trial("vices", 1, 30.0, 3.0), trial("vices", 2, 30.0)]
+    verdict = judge(mine, theirs)
+    assert (verdict.peak_ratio, verdict.peak_ratio_sweeps, verdict.steady_ratio_sweeps) == (1.0, 4.0, 4.0)

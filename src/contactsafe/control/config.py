@@ -8,6 +8,11 @@ import numpy as np
 from contactsafe.errors import InvalidInputError
 
 _PER_JOINT = ("K_pose", "D_pose")
+_POSITIVE = (
+    "dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n", "meet_s", "hold_s",
+    "tank_s",
+)  # fmt: skip
+_SHARES = ("release_fraction", "joint_speed_fraction", "torque_rate_fraction")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
     "push_yield_n", "push_hold_n", "push_tool_n", "pull_max_m_s2", "pull_max_rad_s2",
@@ -33,8 +38,8 @@ class ControllerConfig:
         delay_uncertainty_ticks: by how many ticks a command may come late; its change meanwhile is added to δ.
         mass_uncertainty: standard deviation of the links' relative mass error, which is learned while nothing touches
             the arm; 0 to trust the model.
-        mass_settle_s: time constant with which what was learned enters the command, s.
-        payload_uncertainty_kg: the same of the tool's mass, kg.
+        payload_uncertainty_kg: the same of the tool's mass, kg; it is not learned, and counts where there is no force
+            sensor.
         tool_memory_s: without a force sensor: time constant of the tool's wrench as it was before a contact, s.
         tool_radius_m: without a force sensor: no touch of the tool is further than this from the tool point, m.
         tool_moment_nm: without a force sensor: moment at the tool that noise and model errors may show, N m.
@@ -51,7 +56,7 @@ class ControllerConfig:
         push_yield_n: the same bounds as a force at the link in contact, N; inf for none. The smaller one counts.
         push_hold_n: while something pushes the arm, N; inf for none.
         push_meet_n: the bound with which a contact is met, N; it falls to `push_yield_n` within a few `meet_s`.
-        meet_s: s.
+        meet_s: time constant with which it falls, s.
         push_tool_n: largest commanded push of the tool against what it touches, N; inf for none.
         tool_contact_n: least force at the tool that counts as its contact, N.
         probe_m: way by which the arm gives way to a contact before it judges whether something pushes it, m.
@@ -92,7 +97,6 @@ class ControllerConfig:
     inertia_uncertainty: float = 0.0
     delay_uncertainty_ticks: float = 0.0
     mass_uncertainty: float = 0.0
-    mass_settle_s: float = 5.0
     payload_uncertainty_kg: float = 0.0
     tool_memory_s: float = 0.2
     tool_radius_m: float = 0.08
@@ -146,18 +150,23 @@ class ControllerConfig:
         """
         for field in fields(self):
             _check_numbers(field.name, getattr(self, field.name), field.default)
-        for name in ("dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin"):
+        for name in _POSITIVE:
             if getattr(self, name) <= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)} must be greater than 0")
+        for name in _SHARES:
+            if not 0 < getattr(self, name) <= 1:
+                raise InvalidInputError(f"{name} = {getattr(self, name)} is no share; give more than 0 and at most 1")
         for name in ("stiffness_range", "damping_range"):
             low, high = getattr(self, name)
             if not low < high:
                 raise InvalidInputError(f"{name} = ({low}, {high}) is empty; give (lowest, highest)")
-        if self.push_hold_nm < self.push_yield_nm:
-            raise InvalidInputError(
-                f"push_hold_nm = {self.push_hold_nm} is below push_yield_nm = {self.push_yield_nm}; "
-                "the arm may push harder to hold than to yield, never less"
-            )
+        for unit in ("nm", "n"):
+            hold, yields = getattr(self, f"push_hold_{unit}"), getattr(self, f"push_yield_{unit}")
+            if hold < yields:
+                raise InvalidInputError(
+                    f"push_hold_{unit} = {hold} is below push_yield_{unit} = {yields}; "
+                    "the arm may push harder to hold than to yield, never less"
+                )
 
 
 def _check_numbers(name: str, value, default) -> None:

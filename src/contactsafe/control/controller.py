@@ -136,7 +136,8 @@ class Controller:
                 f"q[{i}] = {q[i]:.4f} rad is outside [{self.arm.q_min[i]:.4f}, {self.arm.q_max[i]:.4f}]; "
                 "give measured joint positions in radians"
             )
-        self.record["state"] = np.zeros((), dtype=self.record["state"].dtype)
+        for part in ("state", "output"):
+            self.record[part] = np.zeros((), dtype=self.record[part].dtype)
         # Should the first measurement be unusable, the torque to repeat is the one that keeps the arm where it is.
         self.record["dynamics"] = self.arm.dynamics(q, np.zeros(self.arm.n))
         self.record["state"]["tau"] = self.record["dynamics"]["g"]

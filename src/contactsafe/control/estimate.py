@@ -24,7 +24,7 @@ _CORRELATED = 10.0
 """Readings of one joint's residual, a few ms apart, err alike: so many of them count as one."""
 
 _NOISE_NM = 0.15
-_FORGET_S = 60.0
+_FORGET_S = 8.0
 _SETTLE_TICKS = 40
 
 
@@ -53,18 +53,17 @@ def start(c):
 def correct_gravity(c):
     """Add what the links were found to weigh more than the model says to the model's gravity torque.
 
-    The observer takes it at once, the command slowly: an arm in free motion moves as its model has it, and what was
-    learned wrongly from a light touch does not pull the arm.
+    That is for the observer and the bounds. The command does without, see `unweighed`: in free motion the arm moves as
+    it would without all this, and nothing that was learned wrongly from a light touch pulls it.
     """
     state = c.state
-    if c.params.mass_uncertainty == 0.0:
+    if not c.params.mass_variance.any():
         return
     mass_regressor(c.handle, c.dynamics.mass_regressor)
     if c.measurement.has_wrench != 0:
         c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
-    state.mass_settled += c.params.settle_share * (state.mass_error - state.mass_settled)
-    state.gravity_late[:] = matvec(c.dynamics.mass_regressor, state.mass_settled - state.mass_error)
-    c.dynamics.g += matvec(c.dynamics.mass_regressor, state.mass_error)
+    state.unweighed[:] = -matvec(c.dynamics.mass_regressor, state.mass_error)
+    c.dynamics.g -= state.unweighed
 
 
 @compiled
@@ -142,25 +141,31 @@ def set_thresholds(c):
         inertial = abs(state.momentum_rate[i]) + abs(c.dynamics.CT_qd[i])
         unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
         unknown += params.delay_uncertainty_ticks * abs(state.torque_ramp[i])
+        state.unknown[i] = unknown
         state.threshold[i] = params.residual_threshold + unknown + _SIGMAS * state.gravity_sigma[i]
 
 
 @compiled
 def weigh_links(c):
-    """Learn from one joint's residual what the links weigh, while nothing touches the arm; one joint a tick."""
+    """Learn from one joint's residual what the links weigh, while nothing touches the arm; one joint a tick.
+
+    Without a force sensor nothing is learned, and with one the tool's weight does not show: what is not known of them
+    stays what it was at first.
+    """
     state, params, dynamics = c.state, c.params, c.dynamics
-    if params.mass_uncertainty == 0.0:
+    if not params.mass_variance.any():
         return
     n = state.tau.shape[0]
     i = state.turn
     state.turn = (i + 1) % n
     row = dynamics.mass_regressor[i]
     for j in range(row.shape[0]):
-        state.mass_covariance[j, j] += params.mass_variance[j] * n * params.dt / _FORGET_S
+        forgotten = state.mass_covariance[j, j] + params.mass_variance[j] * params.dt / _FORGET_S
+        state.mass_covariance[j, j] = min(forgotten, params.mass_variance[j])
     told = c.measurement.has_wrench != 0
     state.ticks += 1
     if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
-        error = _NOISE_NM + state.threshold[i] - params.residual_threshold - _SIGMAS * state.gravity_sigma[i]
+        error = _NOISE_NM + state.unknown[i]
         largest = _SIGMAS * np.sqrt(params.mass_variance)
         weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], _CORRELATED * error * error, largest)
     state.gravity_sigma[i] = _gravity_sigma(c, i)

@@ -171,7 +171,7 @@ def tool_share(F_spring, force, contact_n, push_n):
     size = math.sqrt(dot(force, force))
     if size < contact_n:
         return 1.0
-    push = -dot(force, F_spring[:3]) / size * min((size - contact_n) / max(contact_n, 1e-9), 1.0)
+    push = -dot(force, F_spring[:3]) / size * min((size - contact_n) / contact_n, 1.0)
     return 1.0 if push <= push_n else push_n / push
 
 

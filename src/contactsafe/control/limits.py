@@ -59,7 +59,7 @@ def power_limit(tau_net, qd, tank, power, drain_s):
 
 
 @compiled
-def coming_speed(qd, M_inv, tau_net, step_max, dt):
+def coming_speed(qd, M_inv, momentum_rate, step_max, dt):
     """Give the speed that joints will have before the torque that drives them can be taken off, and when that is.
 
     A command falls by `step_max` a tick at most: until it is gone it goes on accelerating, by half of q̈ on average.
@@ -67,15 +67,15 @@ def coming_speed(qd, M_inv, tau_net, step_max, dt):
     Args:
         qd: (n,), rad/s.
         M_inv: inverse joint inertia, (n, n), 1/(kg m²).
-        tau_net: command in force less gravity and Coriolis torque, (n,), N m.
+        momentum_rate: torque that drives the arm, whatever it comes from, (n,), N m.
         step_max: N m per tick.
         dt: tick, s.
 
     Returns:
         Speed, (n,), rad/s; time, (n,), s.
     """
-    ahead = np.abs(tau_net) * (dt / step_max)
-    return qd + 0.5 * matvec(M_inv, tau_net) * ahead, ahead
+    ahead = np.abs(momentum_rate) * (dt / step_max)
+    return qd + 0.5 * matvec(M_inv, momentum_rate) * ahead, ahead
 
 
 @compiled

@@ -27,8 +27,9 @@ FAULTS = {
     3: "target quaternion is not of unit length; the last good target holds",
     4: "target stiffness or damping is out of range; the last good target holds",
     5: "measurements stayed unusable for 20 ticks; gravity compensation only",
+    6: "the law gave no finite torque; the last torque was repeated",
 }
-"""What `fault` in the state and output means; the first one is latched until reset."""
+"""What `fault` in the state and output means; the first one is latched until reset, but 5 replaces it."""
 
 
 def measurement_dtype(n: int) -> np.dtype:
@@ -64,7 +65,6 @@ _SHARES = (
     "probe_share",
     "hold_share",
     "tool_share",
-    "settle_share",
 )
 """Parts of their way that first-order filters go in one tick."""
 
@@ -132,17 +132,17 @@ def state_dtype(n: int) -> np.dtype:
             ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
             ("alarm", _f, (n,)),  # what is held against the thresholds, N m
             ("threshold", _f, (n,)),  # N m
+            ("unknown", _f, (n,)),  # of it, what friction, inertia and a late command may come to, N m
             ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
-            ("mass_settled", _f, (n + 1,)),  # of it, what the command believes by now
             ("mass_covariance", _f, (n + 1, n + 1)),
-            ("gravity_late", _f, (n,)),  # gravity torque that the command does not compensate yet, negative, N m
+            ("unweighed", _f, (n,)),  # less the gravity torque found by weighing, which the command does without, N m
             ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
             ("turn", _i),  # joint whose residual is weighed next
             ("ticks", _i),  # since reset
             ("K_task", _f, (6,)),  # in force, 1/s²
             ("D_task", _f, (6,)),  # in force, 1/s
             ("tank_j", _f),  # energy that the command may still give, J
-            ("quiet_ticks", _i),  # ticks since the residual was above the threshold
+            ("quiet_ticks", _i),  # ticks since the residual was above what keeps the mode
             ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
             ("contact_link", _i),  # link that the contact is on, 1 … n
             ("lever", _f),  # joint torque per newton there, m
@@ -222,7 +222,6 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["posture_in_contact"] = 0.0 if config.recover_s > 0 else 1.0
     params["probe_share"] = share_per_tick(config.probe_s, dt)
     params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
-    params["settle_share"] = share_per_tick(config.mass_settle_s, dt)
     params["mass_variance"] = _mass_variance(config, arm)
     params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)

@@ -16,6 +16,9 @@ _POINTS_A_TICK = 20
 _LEAST_LEVER = 0.03
 """No contact counts as nearer to all axes than this, m: its force would be anybody's guess."""
 
+_CERTAIN = 4.0
+"""Once the arm holds, so many times the way that began it must speak for an obstacle to end it."""
+
 _LEVER_SHARE = 0.2
 """Of a newly found lever arm that is taken over at once."""
 
@@ -125,14 +128,16 @@ def _watch_push(c):
     step = params.probe_m / lever
     if moved <= 0.0:  # the arm moves into it
         state.moved_rad, state.moved_smooth_rad, state.reference_nm = state.moved_rad - moved, 0.0, torque
+        state.judge_rad, moved = step, 0.0
     state.judge_rad = min(state.judge_rad, moved + step)
     if moved >= state.judge_rad:
         state.judge_rad = moved + step
         if is_pushed(state.reference_nm - torque, moved, lever, params.pusher_stiffness):
-            state.holding = 1
-            state.hold_s = max(2.0 * state.hold_s, params.hold_s)
-            state.hold_nm = params.hold_margin * torque
-        elif state.holding == 0 or moved >= 4.0 * step:
+            fallen = 0.5 * (1.0 + params.hold_margin) * torque
+            if state.holding == 0 or state.hold_nm < fallen:  # it gave way because the bound had fallen
+                state.hold_s = max(2.0 * state.hold_s, params.hold_s)
+            state.holding, state.hold_nm = 1, params.hold_margin * torque
+        elif state.holding == 0 or moved >= _CERTAIN * step:
             state.holding, state.hold_s, state.hold_nm, state.meet_n = 0, 0.0, 0.0, 0.0
     if state.holding != 0:
         state.hold_nm *= 1.0 - params.dt / state.hold_s

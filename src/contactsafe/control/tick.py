@@ -32,7 +32,7 @@ from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
 
-_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST = 1, 2, 3, 4, 5
+_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST, _NO_TORQUE = 1, 2, 3, 4, 5, 6
 
 _ABSURD = 1e6
 """No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
@@ -167,13 +167,13 @@ def _law(c, Lambda, J_bar):
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
     _follow_posture(state, params)
     pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, state.posture_share * params.K_pose * q_error)
-    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd) + state.gravity_late
+    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
     observer_step(state.tool_force, params.probe_share, _tool_force(c, J_bar))
     share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
         _follow_share(state, params, share)
-        tau = state.task_share * pull + damping
+        tau = state.task_share * pull + damping + state.unweighed
     else:
         tau = _contact_law(c, pull, damping, matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque)), N_t - N_ct, share)
     return tau + dynamics.c + dynamics.g
@@ -228,7 +228,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
     if pull_push > 0.0:
         share = min(share, left / pull_push)
     _follow_share(state, params, share)
-    tau = state.task_share * pull + compensation + damping
+    tau = state.task_share * pull + compensation + damping + state.unweighed
     c.output.push_nm, c.output.push_limit_nm = push + pull_push, limit
     push = push_along(direction, M_inv, tau)
     if push > limit:
@@ -254,8 +254,7 @@ def _finish(c, tau):
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     q, qd = c.measurement.q, c.measurement.qd
     tau -= dynamics.g + dynamics.c
-    in_force = state.tau - state.friction - dynamics.g - dynamics.c
-    speed, ahead = coming_speed(qd, dynamics.M_inv, in_force, params.torque_step, params.dt)
+    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
     joint_stop_torque(
         tau, q, qd, dynamics.M, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
         params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
@@ -267,6 +266,9 @@ def _finish(c, tau):
     if params.friction_compensation != 0:
         friction = joint_friction(params.friction, qd)
         tau += friction
+    if not _all_usable(tau):
+        _latch(state, _NO_TORQUE)
+        tau[:] = state.tau
     out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
     state.tau[:] = tau
     state.friction[:] = friction

@@ -33,8 +33,10 @@ class Verdict:
         harder: trials whose peak passes the baseline's by `HARDER_SHARE` and `HARDER_N`.
         peak_ratio: median of the trials' ratios of peaks, baseline to controller, each at least `FLOOR_N`.
         peak_ratio_soft: the same over obstacles of `SOFT_N_M` at most.
+        peak_ratio_sweeps, peak_ratio_soft_sweeps: both over the sweeps alone, where the arm runs into something.
         steady_p95_n, steady_max_n: 95th percentile and largest of the steady force, N.
         steady_ratio: median of the trials' ratios of steady force, baseline to controller, each at least `FLOOR_N`.
+        steady_ratio_sweeps: the same over the sweeps alone.
         met: share of the trials in which it was touched under this controller.
         found: share of those in which this controller reported a contact.
         detect_median_ms, detect_p95_ms: from touch to report, of those, ms.
@@ -47,9 +49,12 @@ class Verdict:
     harder: int
     peak_ratio: float
     peak_ratio_soft: float
+    peak_ratio_sweeps: float
+    peak_ratio_soft_sweeps: float
     steady_p95_n: float
     steady_max_n: float
     steady_ratio: float
+    steady_ratio_sweeps: float
     met: float
     found: float
     detect_median_ms: float
@@ -77,6 +82,8 @@ def judge(trials: Sequence[Trial], baseline: Sequence[Trial]) -> Verdict:
 
     peak, peak_before = mine("contact_peak_n"), theirs("contact_peak_n")
     peak_ratio = _ratio(peak_before, peak)
+    steady_ratio = _ratio(theirs("contact_steady_n"), mine("contact_steady_n"))
+    soft, sweeps = mine("obstacle_stiffness_n_m") <= SOFT_N_M, mine("speed_m_s") > 0
     met = mine("met") > 0
     detect = mine("detect_ms")[met]
     found = np.isfinite(detect)
@@ -85,10 +92,13 @@ def judge(trials: Sequence[Trial], baseline: Sequence[Trial]) -> Verdict:
         left_out=len(pairs) - len(kept),
         harder=int(((peak > HARDER_SHARE * peak_before) & (peak > peak_before + HARDER_N)).sum()),
         peak_ratio=_percentile(peak_ratio, 50),
-        peak_ratio_soft=_percentile(peak_ratio[mine("obstacle_stiffness_n_m") <= SOFT_N_M], 50),
+        peak_ratio_soft=_percentile(peak_ratio[soft], 50),
+        peak_ratio_sweeps=_percentile(peak_ratio[sweeps], 50),
+        peak_ratio_soft_sweeps=_percentile(peak_ratio[soft & sweeps], 50),
         steady_p95_n=_percentile(mine("contact_steady_n"), 95),
         steady_max_n=_percentile(mine("contact_steady_n"), 100),
-        steady_ratio=_percentile(_ratio(theirs("contact_steady_n"), mine("contact_steady_n")), 50),
+        steady_ratio=_percentile(steady_ratio, 50),
+        steady_ratio_sweeps=_percentile(steady_ratio[sweeps], 50),
         met=_share(met),
         found=_share(found),
         detect_median_ms=_percentile(detect[found], 50),
@@ -116,9 +126,12 @@ _ROWS = (
     ("harder", "trials harder than {baseline}", "", 1),
     ("peak_ratio", "peak force, {baseline} / controller, median", "", 1),
     ("peak_ratio_soft", "the same, obstacles of 5 kN/m at most", "", 1),
+    ("peak_ratio_sweeps", "the same, sweeps alone", "", 1),
+    ("peak_ratio_soft_sweeps", "the same, sweeps into 5 kN/m at most", "", 1),
     ("steady_p95_n", "steady force, 95th percentile", "N", 1),
     ("steady_max_n", "steady force, largest", "N", 1),
     ("steady_ratio", "steady force, {baseline} / controller, median", "", 1),
+    ("steady_ratio_sweeps", "the same, sweeps alone", "", 1),
     ("met", "trials in which the obstacle was touched", "%", 100),
     ("found", "of those, contact reported", "%", 100),
     ("detect_median_ms", "touch to report, median", "ms", 1),

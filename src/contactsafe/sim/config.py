@@ -176,6 +176,8 @@ class Obstacle:
             raise InvalidInputError(
                 f"obstacle radius = {self.radius} m, stiffness = {self.stiffness} N/m; both must be greater than 0"
             )
+        if not self.travel_until_n > 0:
+            raise InvalidInputError(f"obstacle travel_until_n = {self.travel_until_n} N; give a force above 0, or inf")
         if any(self.travel) and (self.fixed or not self.travel_s[0] < self.travel_s[1]):
             raise InvalidInputError(
                 f"obstacle travels {self.travel} m in {self.travel_s} s with stiffness {self.stiffness} N/m; "
