@@ -65,6 +65,17 @@ def test_unknown_preset():
         ({"trigger_gain": 0}, "trigger_gain = 0 must be greater than 0"),
         ({"residual_cutoff_hz": 0.0}, "residual_cutoff_hz = 0.0 must be greater than 0"),
         ({"joint_margin": 0.0}, "joint_margin = 0.0 must be greater than 0"),
+        ({"tank_s": 0.0}, "tank_s = 0.0 must be greater than 0"),
+        ({"tool_contact_n": 0.0}, "tool_contact_n = 0.0 must be greater than 0"),
+        ({"meet_s": 0.0}, "meet_s = 0.0 must be greater than 0"),
+        ({"hold_s": 0.0}, "hold_s = 0.0 must be greater than 0"),
+        ({"release_fraction": 0.0}, "release_fraction = 0.0 is no share; give more than 0 and at most 1"),
+        ({"torque_rate_fraction": 5.0}, "torque_rate_fraction = 5.0 is no share; give more than 0 and at most 1"),
+        ({"joint_speed_fraction": 1.1}, "joint_speed_fraction = 1.1 is no share; give more than 0 and at most 1"),
+        (
+            {"push_yield_n": 5.0, "push_hold_n": 4.0},
+            "push_hold_n = 4.0 is below push_yield_n = 5.0; the arm may push harder to hold than to yield, never less",
+        ),
         ({"stiffness_range": (20.0, 10.0)}, "stiffness_range = (20.0, 10.0) is empty; give (lowest, highest)"),
         ({"damping_range": (5.0, 5.0)}, "damping_range = (5.0, 5.0) is empty; give (lowest, highest)"),
         (

@@ -56,6 +56,26 @@ def test_contact_lasts_for_the_dwell(panda):
     assert modes == [True] * 50 + [False] * 51
 
 
+def test_contact_lasts_until_it_is_well_below_the_threshold(panda):
+    """So that a contact kept gentle is not lost from sight."""
+    felt = Felt(panda, replace(presets.paper(), release_fraction=0.5))
+    modes = felt.feel(joint(3, 2.0)) + felt.feel(joint(3, 0.76), 200) + felt.feel(joint(3, 0.74), 1)
+    assert modes == [True] * 201 + [False]
+
+
+def test_a_command_on_the_rise_raises_the_threshold(panda):
+    """By what comes late: at 1 N m a tick and a delay of 1.5 ticks, 1.5 N m."""
+    controller = controller_at(panda, replace(presets.paper(), delay_uncertainty_ticks=1.5, **INSTANT))
+    still = Measurement(panda.home, np.zeros(panda.n), UNTOUCHED)
+    controller.step(still, hold(panda))
+    state = controller.record["state"]
+    for _k in range(3):
+        state["tau"] = state["tau_before"] + np.eye(7)[2]
+        controller.step(still, hold(panda))
+    assert_allclose(state["threshold"], 1.5 + 1.5 * np.abs(state["torque_ramp"]), rtol=1e-12)
+    assert state["torque_ramp"][2] == pytest.approx(1.0)
+
+
 def test_contact_lasts_while_it_is_felt(panda):
     """After the dwell the first tick below δ ends it: release_s is 0 in the paper."""
     felt = Felt(panda, presets.paper())

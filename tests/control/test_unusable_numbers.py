@@ -104,6 +104,15 @@ def test_after_twenty_unusable_measurements_only_gravity_is_carried(panda):
     assert out.fault == "measurements stayed unusable for 20 ticks; gravity compensation only"
 
 
+def test_reset_forgets_what_was_reported(panda):
+    """A contact of before the reset was reported again when the first measurement after it was unusable."""
+    plant, controller = Plant(panda), controller_at(panda, CONFIG)
+    plant.push("link5", (0.0, 40.0, 0.0))
+    assert plant.run(controller, hold(panda), 300).contact.in_contact
+    controller.reset(panda.home)
+    assert not controller.step(Measurement(np.full(7, np.nan), np.zeros(7)), hold(panda)).contact.in_contact
+
+
 def test_arm_dropped_when_the_very_first_measurement_was_unusable(panda):
     controller = controller_at(panda, CONFIG)
     g = panda.dynamics(panda.home, np.zeros(7))["g"]

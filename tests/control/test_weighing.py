@@ -150,3 +150,36 @@ def test_lasting_push_below_the_threshold_is_not_taken_for_a_weight_that_cannot_
     plant.push("link4", (0.0, 0.0, -22.0))
     plant.run(controller, hold(panda), 5000, UNTOUCHED)
     assert np.abs(controller.record["state"]["mass_error"]).max() < 5 * SAFE.mass_uncertainty
+
+
+def test_what_is_learned_does_not_move_the_arm(panda):
+    """In free motion the command is that of an arm which learns nothing, but for what joint stops make of it."""
+    commands = []
+    for config in (SAFE, replace(SAFE, mass_uncertainty=0.0, payload_uncertainty_kg=0.0)):
+        plant, controller = Plant(panda, model=heavier(panda, 1.03)), controller_at(panda, config)
+        seen = []
+        for offset in WAY:
+            for _ in range(300):
+                seen.append(plant.run(controller, reach(panda, offset), 1, UNTOUCHED).torque)
+        assert not controller.record["output"]["mode"]
+        commands.append(seen)
+        if config is SAFE:
+            assert np.abs(controller.record["state"]["unweighed"]).max() > 0.3
+    assert_allclose(commands[0], commands[1], rtol=0, atol=0.03)
+
+
+@pytest.mark.parametrize("wrench", [None, UNTOUCHED])
+def test_not_knowing_does_not_grow_beyond_what_it_was_at_first(panda, wrench):
+    """Without a force sensor nothing is weighed; thresholds would otherwise rise until nothing is found."""
+    plant, controller = Plant(panda), controller_at(panda, SAFE)
+    plant.run(controller, hold(panda), 1, wrench)
+    first = controller.record["state"]["gravity_sigma"].copy()
+    plant.run(controller, hold(panda), 3000, wrench)
+    assert (controller.record["state"]["gravity_sigma"] <= first + 1e-9).all()
+
+
+def test_a_threshold_without_end_keeps_the_torque_finite(panda):
+    plant, controller = Plant(panda), controller_at(panda, replace(SAFE, residual_threshold=np.inf))
+    out = plant.run(controller, reach(panda, WAY[0]), 300, UNTOUCHED)
+    assert np.isfinite(out.torque).all()
+    assert out.fault == "none"

@@ -204,6 +204,18 @@ def test_a_travelling_obstacle_beside_one_that_stays_moves_alone():
     assert_allclose(last[1], ARRIVED, atol=1e-4)
 
 
+def test_an_obstacle_stops_for_good_once_it_presses_hard_enough_and_starts_anew_after_reset():
+    resting = beside_forearm(bottle, y=0.0)
+    away = np.array(resting.position) - (0.0, 0.03, 0.0)
+    thing = replace(resting, position=tuple(away), travel=(0.0, 0.08, 0.0), travel_s=(0.1, 1.1), travel_until_n=4.0)
+    worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(thing,)), "vices")
+    first = run(worlds, 1500)[0].copy()
+    assert first["obstacle_force"].max() > 4.0
+    assert first["obstacle_force"][-300:].mean() < 8.0
+    worlds.reset(0, posture(OVER))
+    assert_array_equal(run(worlds, 1500)[0]["obstacle_position"], first["obstacle_position"])
+
+
 def test_an_obstacle_that_travels_into_the_arm_pushes_it():
     resting = beside_forearm(bottle, y=0.0)
     away = np.array(resting.position) - (0.0, 0.03, 0.0)
