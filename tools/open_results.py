@@ -11,9 +11,10 @@ BLOCK = re.compile(r"(```sh\npython docs/findings\.py (\d+)\n```\n```text\n)(.*?
 
 
 def printed(number: str) -> str:
-    """Run one finding and give what it prints."""
+    """Run one finding and give what it prints below its heading."""
     command = [sys.executable, str(DOCS / "findings.py"), number]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[1:]
+    return "".join(f"{line.strip()}\n" for line in lines)
 
 
 def main() -> None:
