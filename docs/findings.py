@@ -401,7 +401,7 @@ class _ForceAdded(Worlds):
         now, state = self.controllers[i]["dynamics"], self.controllers[i]["state"]
         tau, step = state["tau"].copy(), self.arm.torque_rate_max / 1000.0
         if self.controllers[i]["output"]["mode"] == 1:
-            net = tau - now["c"] - state["gravity_command"] - state["friction"]
+            net = tau - now["c"] - now["g"] - state["friction"]
             over = push_along(state["direction"].copy(), now["M_inv"].copy(), net) - self.bound_nm
             tau += max(over, 0.0) * state["direction"]
         tau = np.clip(np.clip(tau, before - step, before + step), -self.arm.tau_max, self.arm.tau_max)

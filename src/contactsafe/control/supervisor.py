@@ -49,7 +49,7 @@ def supervise(c):
         state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
         _locate(c, link)
     _watch_push(c)
-    c.output.link = state.contact_link if link != 0 and state.contact_link != 0 else link
+    c.output.link = state.contact_link if state.mode == CONTACT and state.contact_link != 0 else link
 
 
 @compiled
