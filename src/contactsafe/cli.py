@@ -65,7 +65,7 @@ def experiment(
     json: bool = False,
     bundle: Path | None = None,
 ) -> None:
-    """Run one experiment: task-safety, joint-safety, disturbance, collisions or detection.
+    """Run one experiment: task-safety, joint-safety, disturbance, collisions, detection or hostile.
 
     task-safety   the policy wipes boards it has never seen: how hard does the tool press?
 
@@ -81,7 +81,7 @@ def experiment(
     of any batch once more and draws it.
 
     Args:
-        name: task-safety, joint-safety, disturbance, collisions or detection.
+        name: task-safety, joint-safety, disturbance, collisions, detection or hostile.
         controllers: presets to compare.
         trials: seeds tried with each controller; 10, and 100 for collisions and detection, where nothing is said.
         seed: first seed.

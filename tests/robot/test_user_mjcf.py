@@ -246,6 +246,14 @@ REFUSED = {
         "body 'plate' has gravcomp = 1; the controller's torque includes gravity, so it must be 0 on every body of the "
         "arm",
     ),
+    "tied": (
+        ["<actuator>", '<equality><joint name="pair" joint1="a" joint2="b"/></equality><actuator>'], {},
+        "equality constraint 'pair' ties the arm; an arm is a free chain of hinges, remove it",
+    ),
+    "bolted to the world": (
+        ["<actuator>", '<equality><weld body1="plate"/></equality><actuator>'], {},
+        "equality constraint 0 (without a name) ties the arm; an arm is a free chain of hinges, remove it",
+    ),
     "home outside": ([], {"home": [3.0, 0.0]}, "home[0] = 3 rad is outside [-2, 2]; move it inside"),
     "torque limits of another arm": ([], {"tau_max": [5.0]}, "tau_max has shape (1,); give 2 finite numbers"),
     "friction of another arm": ([], {"friction": [0.0]}, "friction has shape (1,); give 2 × 3 finite numbers"),

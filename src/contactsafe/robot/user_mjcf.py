@@ -66,14 +66,15 @@ def from_mjcf(
 
     Raises:
         InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
-            site, the choice of joints or actuators is ambiguous, torque limits are missing, or a body of the arm
-            carries its own weight (gravcomp).
+            site, the choice of joints or actuators is ambiguous, torque limits are missing, a body of the arm
+            carries its own weight (gravcomp), or an equality constraint ties the arm.
     """
     model = _loaded(scene)
     site_id = find(model, SITE, site)
     chain = _chain(model, site_id, joints)
     n = len(chain)
     _refuse_weightless(model, chain)
+    _refuse_tied(model, chain)
     limited = model.jnt_limited[chain].astype(bool)
     q_min, q_max = np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
     limits = _torque_limits(model, chain, tau_max)
@@ -94,6 +95,26 @@ def from_mjcf(
         skin=geom_skin(model, data, _shown_by(model, chain), data.xanchor[chain]),
         lever_doubted=_LEVER_DOUBTED,
     )
+
+
+def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
+    """Refuse equality constraints on the arm: a dynamic model of the chain alone would not know them."""
+    carried = {int(model.jnt_bodyid[joint]) for joint in chain}
+    for i in np.flatnonzero(model.eq_active0):
+        ends = [int(end) for end in (model.eq_obj1id[i], model.eq_obj2id[i]) if end >= 0]
+        if model.eq_type[i] == int(mujoco.mjtEq.mjEQ_JOINT):
+            tied = not carried.isdisjoint(int(model.jnt_bodyid[end]) for end in ends)
+        elif model.eq_objtype[i] == int(_BODY):
+            tied = not carried.isdisjoint(int(model.body_weldid[end]) for end in ends)
+        else:
+            tied = model.eq_objtype[i] == int(SITE) and not carried.isdisjoint(
+                int(model.body_weldid[model.site_bodyid[end]]) for end in ends
+            )
+        if tied:
+            name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, int(i))
+            raise InvalidInputError(
+                f"equality constraint {name} ties the arm; an arm is a free chain of hinges, remove it"
+            )
 
 
 def _loaded(scene) -> mujoco.MjModel:
