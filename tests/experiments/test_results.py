@@ -86,6 +86,7 @@ def test_evaluation_of_a_policy_that_cleaned_nothing_is_still_json():
     [
         ({"controllers": ("safe", "best")}, "controller 'best' is unknown; choose from vices, paper, safe"),
         ({"controllers": ()}, "no controller given; choose from vices, paper, safe"),
+        ({"controllers": ("safe", "safe")}, "controllers = safe,safe; give each once"),
         ({"trials": 0}, "trials = 0; give 1 or more"),
         ({"seed": -1}, "seed = -1; give 0 or more"),
         ({"plants": ("real", "wet")}, "plants = real,wet; choose from real, clean"),

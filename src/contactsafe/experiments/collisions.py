@@ -84,7 +84,7 @@ def run_battery(
     finally:
         pool.shutdown(cancel_futures=True)
     trials = tuple(trial for of_batch, _ in done for trial in of_batch)
-    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers)))
+    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers, plants)))
     return Experiment("collisions", QUESTION, trials, tuple(done[0][1]), tables)
 
 
@@ -110,10 +110,11 @@ def _run_batch(
     return trials, recordings
 
 
-def _replay(controllers: Mapping[str, ControllerConfig]) -> str:
+def _replay(controllers: Mapping[str, ControllerConfig], plants: Sequence[str]) -> str:
     """Say how one seed is run again, with {seed} in its place."""
     if all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
         names = "" if tuple(controllers) == ExperimentConfig.controllers else f" --controllers {','.join(controllers)}"
+        names += "" if tuple(plants) == PLANTS else f" --plants {','.join(plants)}"
         return f"contactsafe experiment collisions{names} --trials 1 --out trial-{{seed}} --seed {{seed}}"
     return "run_battery(controllers, [{seed}])"
 

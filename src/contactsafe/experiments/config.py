@@ -37,6 +37,8 @@ class ExperimentConfig:
             raise InvalidInputError(f"no controller given; choose from {', '.join(presets.PRESETS)}")
         for name in self.controllers:
             presets.by_name(name)
+        if len(set(self.controllers)) < len(self.controllers):
+            raise InvalidInputError(f"controllers = {','.join(self.controllers)}; give each once")
         if self.trials < 1:
             raise InvalidInputError(f"trials = {self.trials}; give 1 or more")
         if self.seed < 0:
