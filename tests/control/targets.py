@@ -16,3 +16,11 @@ def corner_target(arm, rng, stiffness, damping):
     """Draw a target at a corner of the joint range, every joint at one of its limits."""
     corner = np.where(rng.random(arm.n) < 0.5, arm.q_min, arm.q_max)
     return Target(arm.tool_pose(corner), np.full(6, stiffness), np.full(6, damping), corner)
+
+
+def harass(k, every, arm, plant, rng, target):
+    """Give the target in force at tick k, a new hostile one every so many ticks; push another link every 500."""
+    if k % 500 == 0:
+        plant.data.xfrc_applied[:] = 0.0
+        plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
+    return hostile_target(arm, rng) if k % every == 0 else target

@@ -1,26 +1,21 @@
 """The page on control says every parameter, every fault and nothing that the code does not."""
 
-import importlib.util
-import pathlib
 import re
 from dataclasses import fields
 
 import pytest
+from tests.docs import DOCS, program
 
 from contactsafe import ControllerConfig
 from contactsafe.control import estimate, laws, supervisor
 from contactsafe.control.records import FAULTS
 
-DOCS = pathlib.Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "concepts" / "control.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def tables():
-    spec = importlib.util.spec_from_file_location("controller_tables", DOCS / "controller_tables.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return program("controller_tables")
 
 
 def test_both_tables_stand_in_the_page(tables):

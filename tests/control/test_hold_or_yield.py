@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
-from tests.control.targets import hostile_target
+from tests.control.targets import harass
 
 from contactsafe import presets
 from contactsafe.control.laws import push_along
@@ -42,19 +42,21 @@ def spring_force(plant):
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
-    """Never held against; after the blow it presses with 2 to 9 N, where the task alone presses with 24 N.
-
-    With less than about 3 N the contact can no longer be told from what is not known of the arm: contact mode ends, the
-    task comes back slowly and is found to press again.
-    """
+    """Never held against; it is left with 2.3 and 2.6 N of the 24 N with which the task alone presses."""
     contacts, forces = [], []
-    for out, _, plant in collision(panda, stiffness):
+    for out, _, plant in collision(panda, stiffness, seconds=4.0):
         contacts.append(out.contact)
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.holding for contact in contacts)
-    assert 0.7 * SAFE.push_yield_n < np.mean(forces[-1000:]) < 2 * SAFE.push_yield_n
-    assert max(forces[-1000:]) < 10.0
+    assert 0.9 * SAFE.push_yield_n < np.mean(forces[-300:]) < 1.1 * SAFE.push_yield_n
+
+
+@pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), (20000.0, 0.12)])
+def test_steady_torque_of_an_obstacle_is_the_bound_in_force(panda, stiffness, off):
+    """But for the angle between the contact's torque and the direction that was found for it."""
+    *_, (_, controller, plant) = collision(panda, stiffness, seconds=4.0)
+    assert spring_torque(plant) == pytest.approx(float(controller.record["output"]["push_limit_nm"]), rel=off)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
@@ -88,13 +90,9 @@ def stopped(controller, q, qd):
 def test_bound_holds_whatever_is_asked_and_whatever_pushes(quick_panda, seed):
     """Hostile targets, pushes anywhere, motors without limits; where no joint stop is in force."""
     rng, plant = np.random.default_rng(seed), Plant(quick_panda)
-    controller, over = controller_at(quick_panda, presets.safe()), []
+    controller, target, over = controller_at(quick_panda, presets.safe()), None, []
     for k in range(3000):
-        if k % 170 == 0:
-            target = hostile_target(quick_panda, rng)
-        if k % 500 == 0:
-            plant.data.xfrc_applied[:] = 0.0
-            plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
+        target = harass(k, 170, quick_panda, plant, rng, target)
         q, qd = plant.q, plant.qd
         out = plant.run(controller, target, 1, UNTOUCHED)
         if out.contact.in_contact and not stopped(controller, q, qd):

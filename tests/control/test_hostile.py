@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.control.plant import UNTOUCHED, Plant, controller_at
-from tests.control.targets import corner_target, hostile_target
+from tests.control.targets import corner_target, harass, hostile_target
 
 from contactsafe import Measurement, Target, presets
 from contactsafe.control.controller import Controller
@@ -23,14 +23,10 @@ def all_finite(record):
 def test_thirty_thousand_ticks_of_random_targets_and_pushes(panda):
     """A target every 17 ticks that has nothing to do with where the arm is; pushes up to 50 N; sensor there or not."""
     rng, plant = np.random.default_rng(7), Plant(panda)
-    controller = controller_at(panda, SAFE)
+    controller, target = controller_at(panda, SAFE), None
     before, contacts, held = panda.dynamics(panda.home, np.zeros(7))["g"], 0, 0
     for k in range(30000):
-        if k % 17 == 0:
-            target = hostile_target(panda, rng)
-        if k % 500 == 0:
-            plant.data.xfrc_applied[:] = 0.0
-            plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
+        target = harass(k, 17, panda, plant, rng, target)
         if k % 2000 == 0:
             wrench = None if rng.random() < 0.5 else UNTOUCHED
         out = controller.step(Measurement(plant.q, plant.qd, wrench), target)

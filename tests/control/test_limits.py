@@ -1,11 +1,15 @@
 """Limits hold whatever is asked."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
+from tests.control.plant import UNTOUCHED, controller_at, reach
 
+from contactsafe import Measurement, presets
 from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_torque
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
@@ -85,6 +89,19 @@ def test_joint_is_braked_before_it_is_too_fast_by_what_still_drives_it(driven):
     excess = coming - QD_MAX[0]
     left = stop([0.0, 0.0], [0.0, -2.0], [0.0, 0.0], (driven, 0.0))[0]
     assert_allclose(left, -BRAKE * M[0, 0] * max(excess, 0.0), rtol=1e-9, atol=1e-9)
+
+
+def test_a_blocked_arm_was_taken_for_one_on_the_move(panda):
+    """Its torque was limited for a speed that it would never have, and chattered."""
+    still, torques = Measurement(panda.home, np.zeros(panda.n), UNTOUCHED), []
+    for config in (presets.vices(), replace(presets.vices(), joint_speed_fraction=0.05)):
+        controller = controller_at(panda, config)
+        for _ in range(300):
+            out = controller.step(still, reach(panda, [0.0, 0.0, -0.1]))
+            torques.append(out.torque)
+        assert_array_equal(torques[-1], torques[-100])
+    assert_array_equal(torques[299], torques[599])
+    assert np.abs(torques[-1] - panda.dynamics(panda.home, np.zeros(panda.n))["g"]).max() > 20.0
 
 
 @given(commands, st.floats(0.0, 0.5), speeds)

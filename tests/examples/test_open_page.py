@@ -1,16 +1,14 @@
 """The page on what the paper leaves open: every finding has a function, and what the page quotes is what it prints."""
 
-import importlib.util
 import re
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
+from tests.docs import DOCS, program
 
 from contactsafe import ControllerConfig
 from contactsafe.experiments.registry import ENTRIES
 
-DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "concepts" / "open.md").read_text(encoding="utf-8")
 QUOTED = dict(re.findall(r"^python docs/findings\.py (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
 WITHOUT_FIGURES = {"9"}
@@ -18,10 +16,7 @@ WITHOUT_FIGURES = {"9"}
 
 @pytest.fixture(scope="module")
 def findings():
-    spec = importlib.util.spec_from_file_location("findings", DOCS / "findings.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return program("findings")
 
 
 def test_every_finding_of_the_page_has_a_function_and_a_figure(findings):

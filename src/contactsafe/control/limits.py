@@ -84,8 +84,7 @@ def joint_stop_torque(tau_net, q, qd, M, speed, ahead, q_min, q_max, qd_max, mar
 
     A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
     what counts is the speed that it will have before the torque that drives it can be taken off. What is faster is
-    braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a
-    spring pushes back.
+    braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a spring pushes back.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.

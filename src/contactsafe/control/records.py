@@ -102,63 +102,84 @@ def state_dtype(n: int) -> np.dtype:
     return np.dtype(
         [
             ("started", _i),  # 0 before the first tick after a reset
-            ("momentum", _f, (n,)),  # at the last tick, kg m²/s
-            ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
-            ("observed", _f, (n,)),  # residual before its low-pass, compensating observer, N m
-            ("observed_trigger", _f, (n,)),  # the same, triggering observer, N m
-            ("residual", _f, (n,)),  # N m
-            ("residual_trigger", _f, (n,)),  # N m
-            ("tau", _f, (n,)),  # last command sent, N m
-            ("friction", _f, (n,)),  # friction torque contained in it, N m
-            ("tau_before", _f, (n,)),  # the command before it, N m
-            ("target", target_dtype(n)),  # last good target
-            ("mode", _i),
-            ("mode_ticks", _i),  # ticks spent in the mode
-            ("moved_rad", _f),  # by which the arm has receded along the contact's direction since the reference
-            ("moved_smooth_rad", _f),  # the same, smoothed
-            ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
-            ("judge_rad", _f),  # where it is judged next whether something pushes
-            ("reference_nm", _f),  # contact torque then, N m
-            ("hold_nm", _f),  # push limit while holding, N m
-            ("meet_n", _f),  # push limit with which the contact was met, falling, N
-            ("hold_s", _f),  # time constant with which it falls, s
-            ("observed_rate", _f, (n,)),  # momentum's rate of change through the triggering observer's filter, N m
-            ("momentum_rate", _f, (n,)),  # the same behind the low-pass, N m
-            ("tool_force", _f, (3,)),  # of the environment on the tool, smoothed, N
-            ("observed_ramp", _f, (n,)),  # change of the command per tick through the triggering observer's filter, N m
-            ("torque_ramp", _f, (n,)),  # the same behind the low-pass, N m
-            ("tool_wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
-            ("arm_torque", _f, (n,)),  # residual less the tool's share, compensating, N m
-            ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
-            ("alarm", _f, (n,)),  # what is held against the thresholds, N m
-            ("threshold", _f, (n,)),  # N m
-            ("unknown", _f, (n,)),  # of it, what friction, inertia and a late command may come to, N m
-            ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
-            ("mass_covariance", _f, (n + 1, n + 1)),
-            ("unweighed", _f, (n,)),  # less the gravity torque found by weighing, which the command does without, N m
-            ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
             ("turn", _i),  # joint whose residual is weighed next
             ("ticks", _i),  # since reset
-            ("K_task", _f, (6,)),  # in force, 1/s²
-            ("D_task", _f, (6,)),  # in force, 1/s
-            ("tank_j", _f),  # energy that the command may still give, J
-            ("quiet_ticks", _i),  # ticks since the residual was above what keeps the mode
-            ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
-            ("contact_link", _i),  # link that the contact is on, 1 … n
-            ("lever", _f),  # joint torque per newton there, m
-            ("lever_most", _f),  # the same, were the push not along the surface's normal, m
-            ("search_at", _i),  # next point of the skin to be searched
-            ("search_point", _i),  # best one of this search so far, −1 for none
-            ("search_fit", _f),  # cosine between its torque and the one found
-            ("posture_share", _f),  # of K_pose in force
-            ("task_share", _f),  # of what pulls to the target in force, 0 … 1
-            ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
-            ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
-            ("holding", _i),  # 1 while something pushes the arm
             ("fault", _i),  # first fault since reset
             ("bad_ticks", _i),  # unusable measurements in a row
+            *_estimated(n),
+            *_supervised(n),
+            *_commanded(n),
         ]
     )
+
+
+def _estimated(n: int) -> list[tuple]:
+    """What acts on the arm and what its links weigh."""
+    return [
+        ("momentum", _f, (n,)),  # at the last tick, kg m²/s
+        ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
+        ("observed", _f, (n,)),  # residual before its low-pass, compensating observer, N m
+        ("observed_trigger", _f, (n,)),  # the same, triggering observer, N m
+        ("residual", _f, (n,)),  # N m
+        ("residual_trigger", _f, (n,)),  # N m
+        ("observed_rate", _f, (n,)),  # momentum's rate of change through the triggering observer's filter, N m
+        ("momentum_rate", _f, (n,)),  # the same behind the low-pass, N m
+        ("observed_ramp", _f, (n,)),  # change of the command per tick through the triggering observer's filter, N m
+        ("torque_ramp", _f, (n,)),  # the same behind the low-pass, N m
+        ("tool_wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
+        ("arm_torque", _f, (n,)),  # residual less the tool's share, compensating, N m
+        ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
+        ("alarm", _f, (n,)),  # what is held against the thresholds, N m
+        ("threshold", _f, (n,)),  # N m
+        ("unknown", _f, (n,)),  # of it, what friction, inertia and a late command may come to, N m
+        ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
+        ("mass_covariance", _f, (n + 1, n + 1)),
+        ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
+    ]
+
+
+def _supervised(n: int) -> list[tuple]:
+    """Mode, the contact, and who pushes whom."""
+    return [
+        ("mode", _i),
+        ("mode_ticks", _i),  # ticks spent in the mode
+        ("moved_rad", _f),  # by which the arm has receded along the contact's direction since the reference
+        ("moved_smooth_rad", _f),  # the same, smoothed
+        ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
+        ("judge_rad", _f),  # where it is judged next whether something pushes
+        ("reference_nm", _f),  # contact torque then, N m
+        ("hold_nm", _f),  # push limit while holding, N m
+        ("hold_s", _f),  # time constant with which it falls, s
+        ("meet_n", _f),  # push limit with which the contact was met, falling, N
+        ("quiet_ticks", _i),  # ticks since the residual was above what keeps the mode
+        ("direction", _f, (n,)),  # unit joint-space direction of the contact's torque on the arm, last seen
+        ("contact_link", _i),  # link that the contact is on, 1 … n
+        ("lever", _f),  # joint torque per newton there, m
+        ("lever_most", _f),  # the same, were the push not along the surface's normal, m
+        ("search_at", _i),  # next point of the skin to be searched
+        ("search_point", _i),  # best one of this search so far, −1 for none
+        ("search_fit", _f),  # cosine between its torque and the one found
+        ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
+        ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
+        ("holding", _i),  # 1 while something pushes the arm
+    ]
+
+
+def _commanded(n: int) -> list[tuple]:
+    """What is followed, what of it is in force, and what was sent."""
+    return [
+        ("tau", _f, (n,)),  # last command sent, N m
+        ("tau_before", _f, (n,)),  # the command before that, N m
+        ("friction", _f, (n,)),  # friction torque contained in the last, N m
+        ("target", target_dtype(n)),  # last good target
+        ("tool_force", _f, (3,)),  # of the environment on the tool, smoothed, N
+        ("unweighed", _f, (n,)),  # less the gravity torque found by weighing, which the command does without, N m
+        ("K_task", _f, (6,)),  # in force, 1/s²
+        ("D_task", _f, (6,)),  # in force, 1/s
+        ("tank_j", _f),  # energy that the command may still give, J
+        ("posture_share", _f),  # of K_pose in force
+        ("task_share", _f),  # of what pulls to the target in force, 0 … 1
+    ]
 
 
 def output_dtype(n: int) -> np.dtype:

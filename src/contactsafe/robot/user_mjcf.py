@@ -100,21 +100,24 @@ def from_mjcf(
 def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
     """Refuse equality constraints on the arm: a dynamic model of the chain alone would not know them."""
     carried = {int(model.jnt_bodyid[joint]) for joint in chain}
-    for i in np.flatnonzero(model.eq_active0):
-        ends = [int(end) for end in (model.eq_obj1id[i], model.eq_obj2id[i]) if end >= 0]
-        if model.eq_type[i] == int(mujoco.mjtEq.mjEQ_JOINT):
-            tied = not carried.isdisjoint(int(model.jnt_bodyid[end]) for end in ends)
-        elif model.eq_objtype[i] == int(_BODY):
-            tied = not carried.isdisjoint(int(model.body_weldid[end]) for end in ends)
-        else:
-            tied = model.eq_objtype[i] == int(SITE) and not carried.isdisjoint(
-                int(model.body_weldid[model.site_bodyid[end]]) for end in ends
-            )
-        if tied:
-            name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, int(i))
+    for i in np.flatnonzero(model.eq_active0).tolist():
+        if not carried.isdisjoint(_tied_bodies(model, i)):
+            name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, i)
             raise InvalidInputError(
                 f"equality constraint {name} ties the arm; an arm is a free chain of hinges, remove it"
             )
+
+
+def _tied_bodies(model: mujoco.MjModel, i: int) -> list[int]:
+    """Give the moving bodies that an equality constraint ties: by their joints, by themselves or by their sites."""
+    ends = [int(end) for end in (model.eq_obj1id[i], model.eq_obj2id[i]) if end >= 0]
+    if model.eq_type[i] == int(mujoco.mjtEq.mjEQ_JOINT):
+        return [int(model.jnt_bodyid[end]) for end in ends]
+    if model.eq_objtype[i] == int(SITE):
+        ends = [int(model.site_bodyid[end]) for end in ends]
+    elif model.eq_objtype[i] != int(_BODY):
+        return []
+    return [int(model.body_weldid[end]) for end in ends]
 
 
 def _loaded(scene) -> mujoco.MjModel:

@@ -109,6 +109,7 @@ def _move_obstacles(plant):
     rest = view1(plant.qpos_spring, plant.nq)
     for index in range(plant.n_obstacles):
         adr = plant.obstacle_springs[index]
+        # Before the first step the sensor still reads what was before the reset.
         if plant.tick > 0 and force_of_obstacle(plant, index) >= plant.obstacle_travel_n[index]:
             plant.obstacle_stopped[index] = 1
         if adr >= 0 and plant.obstacle_stopped[index] == 0:
