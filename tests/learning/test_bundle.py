@@ -12,8 +12,9 @@ onnx = pytest.importorskip("onnx")
 
 from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 
+from contactsafe.envs.foveate import FEATURES  # noqa: E402
 from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
-from contactsafe.learning.bundle import Bundle, digest  # noqa: E402
+from contactsafe.learning.bundle import OBSERVED, Bundle, digest  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
 from contactsafe.learning.policy import Policy  # noqa: E402
@@ -24,6 +25,8 @@ DESCRIPTION = {
     "representation": "tool",
     "window_m": 0.64,
     "view_size": 32,
+    "latent_size": 128,
+    "observes": ["pose"],
     "rate_hz": 60.0,
     "action_repeat": 1,
     "training": {},
@@ -117,15 +120,41 @@ def test_bad_observations_are_refused(exported):
     policy, seen = Policy(exported, H), observations()
     with pytest.raises(InvalidInputError) as error:
         policy.act({**seen, "pose": np.zeros((5, 7))})
-    assert str(error.value) == (
-        "pose has shape (5, 7) and mask (5, 128, 128, 1); give (6,) and (128, 128, 1), or N of each"
-    )
+    assert str(error.value) == "pose has shape (5, 7) beside 5 masks; give (6,), or one a mask"
     seen["pose"][2, 1] = np.nan
     with pytest.raises(InvalidInputError) as error:
         policy.act(seen)
     assert str(error.value) == "pose is not finite; check the robot state before asking the policy"
     with pytest.raises(InvalidInputError):
         Policy(exported, np.zeros((3, 3)))
+
+
+def foveated_bundle(folder, observes):
+    torch.manual_seed(0)
+    k = sum(OBSERVED[name] for name in observes)
+    layers = torch.nn.Sequential(torch.nn.Linear(k + FEATURES, 18))
+    scaling = ObservationScaling((0.0,) * (k + FEATURES), (1.0,) * (k + FEATURES))
+    eyes = {"representation": "foveated", "view_size": 128, "latent_size": FEATURES, "observes": observes}
+    return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **eyes})
+
+
+def test_foveated_needs_no_encoder_and_sees_the_same_from_any_camera(tmp_path):
+    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
+    assert sorted(path.name for path in folder.iterdir()) == ["bundle.json", "policy.onnx"]
+    np.testing.assert_allclose(
+        Policy(folder, H).act(observations()), Policy(folder, 3.0 * H).act(observations()), atol=1e-6
+    )
+
+
+def test_what_is_observed_besides_the_picture_is_asked_for(tmp_path):
+    policy = Policy(foveated_bundle(tmp_path / "bundle", ["pose", "target", "force"]), H)
+    seen = {**observations(), "target": np.zeros((5, 18)), "force": np.zeros((5, 3))}
+    moved = {**seen, "force": np.ones((5, 3))}
+    assert np.abs(policy.act(seen) - policy.act(moved)).max() > 0.0
+    del seen["force"]
+    with pytest.raises(InvalidInputError) as error:
+        policy.act(seen)
+    assert str(error.value) == "observation has no force; this policy observes pose, target, force"
 
 
 def test_missing(bundle):
@@ -165,12 +194,16 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
     path.write_text(whole)
     rewrite(bundle, format=99)
-    assert refusal(bundle) == f"{path} has format 99, this version reads 1; export it anew, or upgrade"
-    rewrite(bundle, format=1, rate_hz="60")
+    assert refusal(bundle) == f"{path} has format 99, this version reads 2; export it anew, or upgrade"
+    rewrite(bundle, format=2, rate_hz="60")
     assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
     rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
     assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"
-    rewrite(bundle, window_m=0.64, actions=["x"])
+    rewrite(bundle, window_m=0.64, observes=["pose", "truth"])
+    assert refusal(bundle) == (
+        f"{path}: observes is ['pose', 'truth'], not some of pose, target, force; export it anew"
+    )
+    rewrite(bundle, observes=["pose"], actions=["x"])
     assert refusal(bundle) == (
         f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade"
     )
@@ -186,7 +219,7 @@ def test_wrong_ports(bundle):
     shutil.copy(bundle / "encoder.onnx", bundle / "policy.onnx")
     reseal(bundle, "policy.onnx")
     assert refusal(bundle) == (
-        f"{bundle}/policy.onnx: input pose is absent, not tensor(float) of shape (N, 6); export the bundle anew"
+        f"{bundle}/policy.onnx: input state is absent, not tensor(float) of shape (N, 6); export the bundle anew"
     )
 
 
@@ -238,10 +271,10 @@ def test_a_model_that_computes_something_else_is_not_written(bundle):
     _, layers, scaling = networks()
     module = DeployedPolicy(layers, scaling)
     examples = [torch.zeros(2, 6), torch.zeros(2, 128)]
-    data = to_onnx(module, examples, ["pose", "latent"], "action")
+    data = to_onnx(module, examples, ["state", "latent"], "action")
     with torch.no_grad():
         layers[-1].bias += 0.1
     with pytest.raises(
         ContactSafeError, match=r"^policy differs from the trained network by .*, allowed 1e-05; not written$"
     ):
-        compare(module, data, "policy", examples, ["pose", "latent"])
+        compare(module, data, "policy", examples, ["state", "latent"])

@@ -24,7 +24,7 @@ TINY = EncoderConfig(size=32, channels=(4, 4, 8))
 
 
 def tiny_config(out, **changes):
-    settings = {"images": 48, "held_out": 16, "epochs": 3, "batch": 16, "warmup_epochs": 1}
+    settings = {"representation": "tool", "images": 48, "held_out": 16, "epochs": 3, "batch": 16, "warmup_epochs": 1}
     settings |= {"threads": 1, "probe_steps": 20}
     return VaeConfig(out=out, encoder=TINY, **{**settings, **changes})
 
@@ -87,8 +87,8 @@ def test_learns_eight_boards_by_heart():
 
 
 def test_dataset_is_seeded_packed_and_as_the_view_is():
-    data = make_dataset(sample_masks, H, 20, 7, "camera", 0.64, 128)
-    again = make_dataset(sample_masks, H, 20, 7, "camera", 0.64, 128)
+    data = make_dataset(sample_masks, H, 20, 7, "paper", 0.64, 128)
+    again = make_dataset(sample_masks, H, 20, 7, "paper", 0.64, 128)
     np.testing.assert_array_equal(data.packed, again.packed)
     assert data.packed.nbytes == 20 * 128 * 128 / 8
     masks = data.masks(np.arange(20))
@@ -177,7 +177,7 @@ def test_runs_are_not_mixed_up(tmp_path):
 def test_perception_refuses_an_unknown_representation_and_a_wrong_mask():
     with pytest.raises(InvalidInputError) as error:
         Perception(None, "world", 0.64, 128, H)
-    assert str(error.value) == 'representation is \'world\'; choose "tool" or "camera"'
+    assert str(error.value) == "representation is 'world'; choose one of foveated, tool, paper"
     with pytest.raises(InvalidInputError) as error:
-        Perception(None, "camera", 0.64, 128, H)(np.zeros((1, 64, 64), np.uint8), BOARD[None])
+        Perception(None, "paper", 0.64, 128, H)(np.zeros((1, 64, 64), np.uint8), BOARD[None])
     assert str(error.value) == "masks are uint8 of shape (1, 64, 64); this encoder takes uint8 (N, 128, 128)"

@@ -106,3 +106,14 @@ def observed_pose(c, out):
     for i in range(3):
         out[i] = c.output.position[i]
         out[3 + i] = rotvec[i]
+
+
+@compiled
+def observed_target(c, pose, out):
+    """Fill x_d less the observed pose, m and rad, then K1, 1/s², and D1, 1/s, (18,)."""
+    rotvec = rotation_from_down(c.target.quat)
+    for i in range(3):
+        out[i] = c.target.position[i] - pose[i]
+        out[3 + i] = rotvec[i] - pose[3 + i]
+    out[6:12] = c.target.K_task
+    out[12:18] = c.target.D_task

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.envs.action import apply_action, observed_pose
+from contactsafe.envs.action import apply_action, observed_pose, observed_target
 from contactsafe.sim.camera import render_mask
 from contactsafe.sim.stepping import run_ticks, tool_position
-from contactsafe.sim.whiteboard import INK
+from contactsafe.sim.whiteboard import INK, row_is_bare
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
 
@@ -21,7 +21,9 @@ task_dtype = np.dtype(
         ("ink_start", _i),  # cells at reset
         ("ink", _i),  # cells now
         ("distance", _f),  # from tool to nearest ink, m; 0 where there is none
-        ("pose", _f, (6,)),  # observation
+        ("pose", _f, (6,)),  # observation: tool position, m, and rotation vector from straight down, rad
+        ("target", _f, (18,)),  # observation: x_d less the pose, m and rad; K1, 1/s²; D1, 1/s
+        ("force", _f, (3,)),  # observation: of the board on the tool, as measured, smoothed, N
         ("reward", _f, (len(REWARD_TERMS),)),
         ("clean", _i),
         ("arm_touched", _i),
@@ -51,6 +53,8 @@ def nearest_ink(cells, origin, cell, position):
     best = math.inf
     px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
     for i in range(cells.shape[0]):
+        if row_is_bare(cells, i):
+            continue
         for j in range(cells.shape[1]):
             if cells[i, j] == INK:
                 count += 1
@@ -101,6 +105,8 @@ def step_tasks(
 
 @compiled
 def observe(plant, controller, cells, camera, task, mask):
-    """Fill what the policy sees: the tool's pose and the camera's mask."""
+    """Fill what the policy sees: the tool's pose, where it is told to be and how stiffly, the force, the mask."""
     observed_pose(controller, task.pose)
+    observed_target(controller, task.pose, task.target)
+    task.force[:] = controller.state.tool_force
     render_mask(camera, cells, plant, mask)

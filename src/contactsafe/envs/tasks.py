@@ -129,9 +129,9 @@ class WipingTasks:
         )  # fmt: skip
 
     def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
-        """Give what the policies see, copied: pose float32 (n, 6), mask uint8 (n, size, size, 1)."""
+        """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
         return {
-            "pose": self.tasks["pose"][i].astype(np.float32),
+            **{name: self.tasks[name][i].astype(np.float32) for name in ("pose", "target", "force")},
             "mask": self.worlds.masks[i][..., None].copy(),
         }
 

@@ -12,12 +12,15 @@ from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.world import POLICY_RATE_HZ
 
+VECTORS = {"pose": 6, "target": 18, "force": 3}
+"""What a policy observes besides the mask, and how many numbers each."""
+
 
 def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
     size = config.world.camera.size
     observation = gymnasium.spaces.Dict(
         {
-            "pose": gymnasium.spaces.Box(-np.inf, np.inf, (6,), np.float32),
+            **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in VECTORS.items()},
             "mask": gymnasium.spaces.Box(0, 255, (size, size, 1), np.uint8),
         }
     )
@@ -27,8 +30,10 @@ def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spac
 class WipingEnv(gymnasium.Env):
     """Wipe the ink off a whiteboard: `contactsafe/Wiping-v0`.
 
-    Observation: `pose`, tool position (m, world) and rotation vector from straight down (rad), (6,); `mask`, the
-    segmented camera image, ink 0 and everything else 255, (128, 128, 1).
+    Observation: `pose`, tool position (m, world) and rotation vector from straight down (rad), (6,); `target`, x_d less
+    that pose (m, rad), K1 (1/s²) and D1 (1/s) as now in force, (18,); `force` of the board on the tool as the wrist
+    measures it, smoothed, world axes (N), (3,); `mask`, the segmented camera image, ink 0 and everything else 255,
+    (128, 128, 1).
     Action: increments of x_d (6), K1 (6) and D1 (6), in [−1, 1], 60 Hz over 1 kHz ticks.
     `reset(options={"drawing": image})` puts a drawing of the user's own on the board.
 

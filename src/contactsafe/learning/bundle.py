@@ -1,4 +1,4 @@
-"""A policy as it is shipped: a folder with two ONNX models and a page of JSON that describes and seals them.
+"""A policy as it is shipped: a folder with its ONNX models and a page of JSON that describes and seals them.
 
 Nothing here unpickles or runs what it reads: files are bounded in size, compared with their SHA-256, and handed to ONNX
 Runtime as bytes. The digests guard against damage and mix-ups; they are no signature.
@@ -15,18 +15,21 @@ import numpy as np
 import onnxruntime
 
 from contactsafe.errors import BundleError
-from contactsafe.learning.perception import REPRESENTATIONS, open_session
+from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
 
-FORMAT = 1
+FORMAT = 2
 """Version of the folder's layout; raised when an older reader would misread it."""
 
 MANIFEST = "bundle.json"
-MODELS = ("encoder.onnx", "policy.onnx")
+ENCODER, POLICY = "encoder.onnx", "policy.onnx"
 MAX_MANIFEST_BYTES = 1_000_000
 MAX_MODEL_BYTES = 16_000_000
 
-POSE = 6
-LATENT = 128
+OBSERVED = {"pose": 6, "target": 18, "force": 3}
+"""What a policy may take besides the latent, and how many numbers each."""
+
+MAX_LATENT = 4096
+
 ACTIONS = tuple(
     f"{group}_{axis}"
     for group in ("x_d", "K_task", "D_task")
@@ -40,6 +43,8 @@ FIELDS = {
     "representation": str,
     "window_m": float,
     "view_size": int,
+    "latent_size": int,
+    "observes": list,
     "rate_hz": float,
     "action_repeat": int,
     "actions": list,
@@ -69,13 +74,15 @@ class Bundle:
     Attributes:
         folder: where it was read.
         manifest: bundle.json as it stands.
-        encoder: session: "mask" (N, size, size) uint8 to "latent" (N, 128) float32.
-        policy: session: "pose" (N, 6) and "latent" (N, 128), float32, to "action" (N, 18) float32 in [-1, 1].
+        encoder: session: "mask" (N, size, size) uint8 to "latent" (N, latent_size) float32; None for foveated pictures,
+            which are computed, not learned.
+        policy: session: "state" (N, k), the vectors it observes one after the other, and "latent" (N, latent_size),
+            float32, to "action" (N, 18) float32 in [-1, 1].
     """
 
     folder: Path
     manifest: dict
-    encoder: onnxruntime.InferenceSession
+    encoder: onnxruntime.InferenceSession | None
     policy: onnxruntime.InferenceSession
 
     @classmethod
@@ -96,12 +103,16 @@ class Bundle:
         if not folder.is_dir():
             raise BundleError(f"no bundle at {folder}: not a folder; give the path of a folder that holds {MANIFEST}")
         manifest = _read_manifest(folder)
-        models = {name: _read_model(folder, name, manifest["files"]) for name in MODELS}
-        encoder, policy = (open_session(models[name], f"{folder / name}") for name in MODELS)
-        size = manifest["view_size"]
-        _check_ports(folder / MODELS[0], encoder, {"mask": ("uint8", [size, size])}, {"latent": ("float", [LATENT])})
-        inputs = {"pose": ("float", [POSE]), "latent": ("float", [LATENT])}
-        _check_ports(folder / MODELS[1], policy, inputs, {"action": ("float", [len(ACTIONS)])})
+        latent = ("float", [manifest["latent_size"]])
+        encoder = None
+        if manifest["representation"] in LEARNED:
+            encoder = _read_model(folder, ENCODER, manifest["files"])
+            size = manifest["view_size"]
+            _check_ports(folder / ENCODER, encoder, {"mask": ("uint8", [size, size])}, {"latent": latent})
+        policy = _read_model(folder, POLICY, manifest["files"])
+        state = ("float", [sum(OBSERVED[name] for name in manifest["observes"])])
+        inputs = {"state": state, "latent": latent}
+        _check_ports(folder / POLICY, policy, inputs, {"action": ("float", [len(ACTIONS)])})
         return cls(folder, manifest, encoder, policy)
 
     @property
@@ -141,12 +152,17 @@ def _read_manifest(folder):
         if not fits:
             raise BundleError(f"{path}: {name} is {value!r}, not {kind.__name__}; export the bundle anew")
     if manifest["representation"] not in REPRESENTATIONS:
-        raise BundleError(f'{path}: representation is {manifest["representation"]!r}, not "tool" or "camera"')
+        allowed = ", ".join(REPRESENTATIONS)
+        raise BundleError(f"{path}: representation is {manifest['representation']!r}, not one of {allowed}")
+    observes = manifest["observes"]
+    if not all(isinstance(name, str) and name in OBSERVED for name in observes) or len(set(observes)) < len(observes):
+        raise BundleError(f"{path}: observes is {observes!r}, not some of {', '.join(OBSERVED)}; export it anew")
     if manifest["actions"] != list(ACTIONS):
         raise BundleError(f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade")
     for name, low, high in (
         ("window_m", 0.01, 10.0),
         ("view_size", 8, 1024),
+        ("latent_size", 1, MAX_LATENT),
         ("rate_hz", 0.1, 1000.0),
         ("action_repeat", 1, 100),
     ):
@@ -167,7 +183,7 @@ def _read_model(folder, name, files):
     if b"location" in data:
         # The key under which ONNX names a file that holds weights. What we export has no such word anywhere.
         raise BundleError(f"{path} keeps weights in another file; export it with the weights inside")
-    return data
+    return open_session(data, str(path))
 
 
 def _check_ports(path, session, inputs, outputs):
@@ -186,6 +202,7 @@ def _check_ports(path, session, inputs, outputs):
 
 
 def blank_observation(manifest, n=1):
-    """Make an observation of an empty board, to try a policy out: pose (n, 6) float32, mask (n, 128, 128, 1) uint8."""
+    """Make an observation of an empty board, to try a policy out: vectors (n, k) float32, mask (n, m, m, 1) uint8."""
     side = 128 if manifest["representation"] == "tool" else manifest["view_size"]
-    return {"pose": np.zeros((n, POSE), np.float32), "mask": np.full((n, side, side, 1), 255, np.uint8)}
+    vectors = {name: np.zeros((n, size), np.float32) for name, size in OBSERVED.items()}
+    return {**vectors, "mask": np.full((n, side, side, 1), 255, np.uint8)}

@@ -7,6 +7,7 @@ from tqdm import tqdm
 
 from contactsafe.envs.rectify import rectify
 from contactsafe.errors import InvalidInputError
+from contactsafe.learning.perception import LEARNED
 
 CHUNK = 512
 
@@ -41,7 +42,7 @@ def make_dataset(sample_masks, homography, count, seed, representation, window_m
         homography: board plane to pixels, (3, 3).
         count: pictures to make.
         seed: of the draw; the same seed gives the same pictures.
-        representation: "tool" (rectified to the tool's frame) or "camera" (as the camera sees it).
+        representation: "tool" (rectified to the tool's frame) or "paper" (as the camera sees it).
         window_m: side of the tool's window, m.
         size: pixels along a side.
 
@@ -49,10 +50,10 @@ def make_dataset(sample_masks, homography, count, seed, representation, window_m
         A MaskDataset of count pictures.
 
     Raises:
-        InvalidInputError: representation is unknown, or "camera" masks are not of the given size.
+        InvalidInputError: representation is unknown, or "paper" masks are not of the given size.
     """
-    if representation not in ("tool", "camera"):
-        raise InvalidInputError(f'representation is {representation!r}; choose "tool" or "camera"')
+    if representation not in LEARNED:
+        raise InvalidInputError(f"representation is {representation!r}; choose one of {', '.join(LEARNED)}")
     packed = np.empty((count, size, size // 8), dtype=np.uint8)
     starts = range(0, count, CHUNK)
     seeds = np.random.SeedSequence(seed).generate_state(len(starts))

@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from contactsafe.errors import BundleError, ContactSafeError, OutputError
-from contactsafe.learning.bundle import ACTIONS, FORMAT, LATENT, MANIFEST, MODELS, POSE, Bundle, digest
+from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, OBSERVED, POLICY, Bundle, digest
 from contactsafe.learning.checkpoints import write_atomically, write_json
 from contactsafe.learning.encoder import MaskEncoder
 from contactsafe.learning.perception import open_session
@@ -25,10 +25,10 @@ OPSET = 18
 
 
 class DeployedPolicy(nn.Module):
-    """Raw pose and latent to a clipped action: the scaling and the clipping travel inside the graph.
+    """Raw state and latent to a clipped action: the scaling and the clipping travel inside the graph.
 
     Args:
-        layers: the trained network, scaled observation (N, 134) to mean action (N, 18).
+        layers: the trained network, scaled observation (N, k) to mean action (N, 18).
         scaling: the ObservationScaling it was trained with.
     """
 
@@ -39,9 +39,9 @@ class DeployedPolicy(nn.Module):
         self.register_buffer("centre", torch.tensor(scaling.centre, dtype=torch.float32))
         self.register_buffer("scale", torch.tensor(scaling.scale, dtype=torch.float32))
 
-    def forward(self, pose, latent):
+    def forward(self, state, latent):
         """Give the action, (N, 18) in [-1, 1]."""
-        scaled = (torch.cat([pose, latent], dim=1) - self.centre) / self.scale
+        scaled = (torch.cat([state, latent], dim=1) - self.centre) / self.scale
         return self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
 
 
@@ -120,14 +120,15 @@ def export_encoder(vae, path, size):
 
 
 def export_bundle(folder, encoder, layers, scaling, description, force=False):
-    """Write a bundle: both models, bundle.json with their digests, the whole read back before it takes its place.
+    """Write a bundle: its models, bundle.json with their digests, the whole read back before it takes its place.
 
     Args:
         folder: where to; made anew.
-        encoder: bytes of encoder.onnx.
-        layers: the trained policy network, scaled observation (N, 134) to mean action (N, 18).
+        encoder: bytes of encoder.onnx; None for a representation that has none.
+        layers: the trained policy network, scaled observation (N, k) to mean action (N, 18).
         scaling: the ObservationScaling it was trained with.
-        description: representation, window_m, view_size, rate_hz, action_repeat, training, results.
+        description: representation, window_m, view_size, latent_size, observes, rate_hz, action_repeat, training,
+            results.
         force: replace a folder that is there.
 
     Returns:
@@ -144,13 +145,11 @@ def export_bundle(folder, encoder, layers, scaling, description, force=False):
         raise OutputError(f"{folder} is no bundle and will not be replaced; give another folder")
     module = DeployedPolicy(layers, scaling)
     generator = torch.Generator().manual_seed(0)
-    examples = [
-        3.0 * torch.randn((64, POSE), generator=generator),
-        3.0 * torch.randn((64, LATENT), generator=generator),
-    ]
-    policy = to_onnx(module, [x[:2] for x in examples], ["pose", "latent"], "action")
-    compare(module, policy, "policy.onnx", examples, ["pose", "latent"])
-    models = dict(zip(MODELS, (encoder, policy), strict=True))
+    sizes = (sum(OBSERVED[name] for name in description["observes"]), description["latent_size"])
+    examples = [3.0 * torch.randn((64, size), generator=generator) for size in sizes]
+    policy = to_onnx(module, [x[:2] for x in examples], ["state", "latent"], "action")
+    compare(module, policy, POLICY, examples, ["state", "latent"])
+    models = {POLICY: policy} if encoder is None else {ENCODER: encoder, POLICY: policy}
     manifest = {
         "format": FORMAT,
         "task": "contactsafe/Wiping-v0",

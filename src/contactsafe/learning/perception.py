@@ -3,10 +3,14 @@
 import numpy as np
 import onnxruntime
 
+from contactsafe.envs.foveate import FEATURES, foveate, ground_of
 from contactsafe.envs.rectify import rectify
 from contactsafe.errors import BundleError, InvalidInputError
 
-REPRESENTATIONS = ("tool", "camera")
+LEARNED = ("tool", "paper")
+"""Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
+
+REPRESENTATIONS = ("foveated", *LEARNED)
 
 
 def open_session(model, name, threads=1):
@@ -37,21 +41,28 @@ class Perception:
     """Masks and tool positions in, latents out.
 
     Args:
-        session: ONNX Runtime session of the encoder.
-        representation: "tool" shows the encoder the mask in the tool's frame, "camera" as it is.
-        window_m: side of the tool's window, m.
-        size: pixels along a side of what the encoder takes.
-        homography: board plane to camera pixels, (3, 3); not read for "camera".
+        session: ONNX Runtime session of the encoder; None for "foveated", which has none.
+        representation: "foveated" says where ink is as seen from the tool (`envs.foveate`); "tool" shows the encoder
+            the mask in the tool's frame, "paper" as the camera sees it.
+        window_m: side of the tool's window, m; read for "tool".
+        size: pixels along a side of what the encoder takes, or of the camera's mask.
+        homography: board plane to camera pixels, (3, 3); not read for "paper".
+
+    Attributes:
+        latent_size: how many numbers come out.
     """
 
     def __init__(self, session, representation, window_m, size, homography):
         if representation not in REPRESENTATIONS:
-            raise InvalidInputError(f'representation is {representation!r}; choose "tool" or "camera"')
+            allowed = ", ".join(REPRESENTATIONS)
+            raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
         self.session = session
         self.representation = representation
         self.window_m = window_m
         self.size = size
-        self.homography = np.array(homography, dtype=np.float64) if representation == "tool" else None
+        self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
+        self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
+        self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
     def __call__(self, masks, tool_positions):
         """Encode a batch.
@@ -61,11 +72,13 @@ class Perception:
             tool_positions: (N, 2) or wider, m, world; x and y are read.
 
         Returns:
-            Latents, (N, 128) float32.
+            Latents, (N, latent_size) float32.
 
         Raises:
             InvalidInputError: a shape or type differs.
         """
+        if self.ground is not None:
+            return foveate(masks, tool_positions, self.ground)
         if self.representation == "tool":
             views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
         else:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.errors import BundleError, InvalidInputError
-from contactsafe.learning.bundle import ACTIONS, POSE, Bundle, blank_observation
+from contactsafe.learning.bundle import ACTIONS, OBSERVED, Bundle, blank_observation
 from contactsafe.learning.perception import Perception
 
 
@@ -26,6 +26,7 @@ class Policy:
         manifest = self.bundle.manifest
         self.action_repeat = self.bundle.action_repeat
         self.rate_hz = self.bundle.rate_hz
+        self._observes = manifest["observes"]
         self._perceive = Perception(
             self.bundle.encoder, manifest["representation"], manifest["window_m"], manifest["view_size"], homography
         )
@@ -43,27 +44,37 @@ class Policy:
         """Choose the action.
 
         Args:
-            observation: the task's dict. pose: (6,) or (N, 6), tool position in m then rotation vector in rad; mask:
-                (128, 128, 1) or (N, 128, 128, 1) uint8, ink 0.
+            observation: the task's dict. pose: (6,) or (N, 6), tool position in m then rotation vector in rad; target
+                (18,) and force (3,), or N of each, where the bundle observes them (`WipingEnv` says what they are);
+                mask: (128, 128, 1) or (N, 128, 128, 1) uint8, ink 0.
 
         Returns:
             Action, (18,) or (N, 18) float32 in [-1, 1]; the same for the same observation.
 
         Raises:
-            InvalidInputError: pose or mask has another shape or type, or the pose is not finite.
+            InvalidInputError: something the policy observes is missing, has another shape or type, or is not finite.
         """
-        pose = np.asarray(observation["pose"], dtype=np.float32)
-        mask = np.asarray(observation["mask"])
-        if single := pose.ndim == 1:
-            pose, mask = pose[None], mask[None]
-        if pose.ndim != 2 or pose.shape[1] != POSE or len(mask) != len(pose):
-            raise InvalidInputError(
-                f"pose has shape {pose.shape} and mask {mask.shape}; give (6,) and (128, 128, 1), or N of each"
-            )
-        if not np.all(np.isfinite(pose)):
-            raise InvalidInputError("pose is not finite; check the robot state before asking the policy")
+        mask, single = np.asarray(observation["mask"]), np.ndim(observation["pose"]) == 1
+        if single:
+            mask = mask[None]
+        pose = self._vector(observation, "pose", single, len(mask))
+        state = np.concatenate([self._vector(observation, name, single, len(mask)) for name in self._observes], axis=1)
         latent = self._perceive(mask, pose)
-        action = self.bundle.policy.run(["action"], {"pose": pose, "latent": latent})[0]
+        action = self.bundle.policy.run(["action"], {"state": state, "latent": latent})[0]
         if action.shape != (len(pose), len(ACTIONS)) or not np.all(np.isfinite(action)):
             raise BundleError(f"{self.bundle.folder} gave an action that is not 18 finite numbers; do not run it")
         return action[0] if single else action
+
+    def _vector(self, observation, name, single, n):
+        """Give one of the vectors observed, (n, k) float32, checked."""
+        if name not in observation:
+            raise InvalidInputError(f"observation has no {name}; this policy observes {', '.join(self._observes)}")
+        value = np.asarray(observation[name], dtype=np.float32)
+        value = value[None] if single else value
+        if value.shape != (n, OBSERVED[name]):
+            raise InvalidInputError(
+                f"{name} has shape {value.shape} beside {n} masks; give ({OBSERVED[name]},), or one a mask"
+            )
+        if not np.all(np.isfinite(value)):
+            raise InvalidInputError(f"{name} is not finite; check the robot state before asking the policy")
+        return value

@@ -1,4 +1,4 @@
-"""Train the β-VAE on masks from the simulator, report what it keeps of thin ink, and write the encoder."""
+"""Prepare the policy's eyes: train the β-VAE on masks from the simulator, or set up those that need no training."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,6 +22,7 @@ from contactsafe.learning.checkpoints import (
 from contactsafe.learning.datasets import make_dataset
 from contactsafe.learning.encoder import LATENT, VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
+from contactsafe.learning.perception import Perception
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
 
 HELD_OUT_SEED = 1_000_003
@@ -35,7 +36,8 @@ class VaeConfig:
     Attributes:
         out: folder of the run: checkpoint, TensorBoard log, encoder.onnx, vae.json.
         resume: go on from the checkpoint in out.
-        representation: "tool" encodes the mask in the tool's frame, "camera" the fixed camera's (the paper's).
+        representation: "foveated" says where ink is as seen from the tool and needs no training: nothing but its
+            statistics is measured; "tool" trains the β-VAE on the mask in the tool's frame, "paper" on the camera's.
         window_m: side of the tool's window, m.
         encoder: shape of the network.
         images: pictures to train on.
@@ -53,7 +55,7 @@ class VaeConfig:
 
     out: Path = Path("runs/vae")
     resume: bool = False
-    representation: Literal["tool", "camera"] = "tool"
+    representation: Literal["foveated", "tool", "paper"] = "foveated"
     window_m: float = WINDOW_M
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
     images: int = 20_000
@@ -85,6 +87,10 @@ def train_vae(config, sample_masks, homography):
         InvalidInputError: nothing to resume, or settings differ from those the run was started with.
     """
     out = prepare_folder(config.out, config.resume)
+    if config.representation == "foveated":
+        report = _report_foveated(config, sample_masks, homography)
+        write_json(out / "vae.json", report)
+        return report
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     vae = VAE(config.encoder)
@@ -139,6 +145,28 @@ def _train_epoch(vae, optimiser, data, epoch, config):
     return dict(zip(("loss", "reconstruction", "divergence"), totals / steps, strict=True))
 
 
+def _report_foveated(config, sample_masks, homography):
+    """Measure how the numbers of foveated pictures are spread."""
+    masks, tools = sample_masks(config.held_out, config.seed)
+    size = masks.shape[1]
+    latents = Perception(None, "foveated", config.window_m, size, homography)(masks, tools)
+    return _description(config, size, latents.mean(0), latents.std(0))
+
+
+def _description(config, size, mean, std):
+    return {
+        "format": 2,
+        "representation": config.representation,
+        "window_m": config.window_m,
+        "size": size,
+        "latent_mean": mean.tolist(),
+        "latent_std": std.tolist(),
+        # Burda et al. 2016: a number is in use if its mean moves with the picture, variance above 0.01.
+        "active_latents": int((std**2 > 0.01).sum()),
+        "config": plain(config),
+    }
+
+
 @torch.no_grad()
 def _latent_statistics(vae, data, count=4096):
     """Give mean and standard deviation of each latent number over up to count pictures, each (128,)."""
@@ -150,18 +178,8 @@ def _latent_statistics(vae, data, count=4096):
 def _report(vae, data, held_out, config):
     vae.eval()
     mean, std = _latent_statistics(vae, data)
-    report = {
-        "format": 1,
-        "representation": config.representation,
-        "window_m": config.window_m,
-        "size": config.encoder.size,
-        "latent_mean": mean.tolist(),
-        "latent_std": std.tolist(),
-        # Burda et al. 2016: a number is in use if its mean moves with the picture, variance above 0.01.
-        "active_latents": int((std**2 > 0.01).sum()),
-        "reconstruction": reconstruction_report(vae, held_out),
-        "config": plain(config),
-    }
+    report = _description(config, config.encoder.size, mean, std)
+    report["reconstruction"] = reconstruction_report(vae, held_out)
     if config.representation == "tool" and config.probe_steps:
         report["nearest_ink"] = nearest_ink_error(vae, data, held_out, config.window_m, config.probe_steps, config.seed)
     return report

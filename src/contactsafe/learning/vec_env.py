@@ -142,7 +142,7 @@ class EncodedVecEnv(VecEnv):
         last = {key: step_values(info, done, key) for key in ("ink_left", "is_success")}
         rows = np.flatnonzero(done)
         final = info["final_obs"]
-        final = {k: np.stack([final[i][k] for i in rows]) for k in ("pose", "mask")}
+        final = {k: np.stack([final[i][k] for i in rows]) for k in final[rows[0]]}
         encoded = self._encode(final)
         for row, i in enumerate(rows):
             metrics = {key: float(value[i]) for key, value in self._tally.items()}

@@ -14,7 +14,7 @@ from contactsafe.compiled import compiled
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
-from contactsafe.sim.whiteboard import Whiteboard
+from contactsafe.sim.whiteboard import Whiteboard, row_is_bare
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
@@ -135,21 +135,34 @@ def render_mask(camera, cells, plant, out):
         out: uint8, (size, size); overwritten.
     """
     out[:] = OTHER_PIXEL
-    flat = out.reshape(-1)
-    for i in range(cells.shape[0]):
-        for j in range(cells.shape[1]):
-            if cells[i, j] != 0:
-                for k in range(4):
-                    if camera.pixels[i, j, k] >= 0:
-                        flat[camera.pixels[i, j, k]] = INK_PIXEL
+    marked = _mark_ink(camera, cells, out.reshape(-1))
     xpos, xmat = view2(plant.geom_xpos, plant.ngeom, 3), view2(plant.geom_xmat, plant.ngeom, 9)
     for s in range(camera.shapes.shape[0]):
         geom = camera.shapes[s, 0]
-        _hide_behind(camera, camera.shapes[s, 1], camera.sizes[geom], xpos[geom], xmat[geom], out)
+        _hide_behind(camera, camera.shapes[s, 1], camera.sizes[geom], xpos[geom], xmat[geom], marked, out)
 
 
 @compiled
-def _hide_behind(camera, is_box, size, centre, mat, out):
+def _mark_ink(camera, cells, flat):
+    """Mark the pixels that ink or an object touches; give their numbers."""
+    marked = np.empty(flat.shape[0], dtype=np.int32)
+    count = 0
+    for i in range(cells.shape[0]):
+        if row_is_bare(cells, i):
+            continue
+        for j in range(cells.shape[1]):
+            if cells[i, j] != 0:
+                for k in range(4):
+                    pixel = camera.pixels[i, j, k]
+                    if pixel >= 0 and flat[pixel] != INK_PIXEL:
+                        flat[pixel] = INK_PIXEL
+                        marked[count] = pixel
+                        count += 1
+    return marked[:count]
+
+
+@compiled
+def _hide_behind(camera, is_box, size, centre, mat, marked, out):
     """Unmark the marked pixels whose line of sight meets one shape before the board."""
     eye, focal = camera.position, camera.focal_px[0]
     bound = math.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2) if is_box else size[0] + size[1]
@@ -168,16 +181,16 @@ def _hide_behind(camera, is_box, size, centre, mat, out):
         stretch_u, stretch_v = 1.0 + abs(x[0]) / x[2], 1.0 + abs(x[1]) / x[2]
         u0, u1 = max(0, int(u - reach * stretch_u)), min(n, int(u + reach * stretch_u) + 2)
         v0, v1 = max(0, int(v - reach * stretch_v)), min(n, int(v + reach * stretch_v) + 2)
-    for row in range(v0, v1):
-        for column in range(u0, u1):
-            if out[row, column] == INK_PIXEL:
-                ray, length = camera.rays[row, column], camera.distance[row, column]
-                if is_box:
-                    hit = _ray_meets_box(eye, ray, length, centre, mat, size)
-                else:
-                    hit = _ray_meets_capsule(eye, ray, length, centre, mat, size)
-                if hit:
-                    out[row, column] = OTHER_PIXEL
+    for pixel in marked:
+        row, column = pixel // n, pixel % n
+        if v0 <= row < v1 and u0 <= column < u1 and out[row, column] == INK_PIXEL:
+            ray, length = camera.rays[row, column], camera.distance[row, column]
+            if is_box:
+                hit = _ray_meets_box(eye, ray, length, centre, mat, size)
+            else:
+                hit = _ray_meets_capsule(eye, ray, length, centre, mat, size)
+            if hit:
+                out[row, column] = OTHER_PIXEL
 
 
 @compiled
