@@ -176,21 +176,27 @@ def bench(json: bool = False, bundle: Path | None = None) -> None:
 
 
 def train(arguments: Sequence[str]) -> None:
-    """Train the eyes (vae) or the policy (ppo); `contactsafe train vae --help` and `contactsafe train ppo --help`."""
+    """Train the eyes (vae) or a policy (ppo, sac); `contactsafe train vae --help`, `contactsafe train ppo --help`."""
     if not arguments or arguments[0] in ("-h", "--help"):
         print(
-            "usage: contactsafe train vae|ppo [options]\n\n"
+            "usage: contactsafe train vae|ppo|sac [options]\n\n"
             "  vae  the β-VAE on masks from the simulator; writes runs/vae\n"
-            "  ppo  the policy on [pose, latent]; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n\n"
-            "Both show a progress bar, log to TensorBoard, and go on with --resume where they were stopped."
+            "  ppo  a policy on [pose, latent]; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
+            "  sac  the same with SAC, which reuses what it has seen; writes runs/sac\n\n"
+            "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
+            "from its last epoch or rollout, and ends with the weights that it would have had."
         )
         return
-    if arguments[0] not in ("vae", "ppo"):
-        raise InvalidInputError(f"'contactsafe train {arguments[0]}' is unknown; choose vae or ppo")
+    name = arguments[0]
+    if name not in ("vae", "ppo", "sac"):
+        raise InvalidInputError(f"'contactsafe train {name}' is unknown; choose vae, ppo or sac")
     missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if importlib.util.find_spec(name) is None]
     if missing:
         raise InvalidInputError(f"training needs {', '.join(missing)}; run: pip install 'contactsafe[train]'")
-    {"vae": _train_vae, "ppo": _train_ppo}[arguments[0]](list(arguments[1:]))
+    if name == "vae":
+        _train_vae(list(arguments[1:]))
+    else:
+        _train_policy(name, list(arguments[1:]))
 
 
 def _train_vae(arguments: list[str]) -> None:
@@ -204,19 +210,20 @@ def _train_vae(arguments: list[str]) -> None:
     print(f"encoder: {config.out}; next: contactsafe train ppo --vae {config.out}")
 
 
-def _train_ppo(arguments: list[str]) -> None:
+def _train_policy(algorithm: str, arguments: list[str]) -> None:
     import gymnasium
 
     from contactsafe.envs.config import WipingConfig
-    from contactsafe.learning.train_ppo import PpoConfig, train_ppo
+    from contactsafe.learning.algorithms import ALGORITHMS
+    from contactsafe.learning.train_policy import train_policy
 
-    config = tyro.cli(PpoConfig, prog="contactsafe train ppo", args=arguments)
+    config = tyro.cli(ALGORITHMS[algorithm], prog=f"contactsafe train {algorithm}", args=arguments)
     free_space = WipingConfig(controller="vices")
 
     def make_env(n: int):
         return gymnasium.make_vec(config.env_id, num_envs=n, config=free_space)
 
-    print(to_json(train_ppo(config, make_env)))
+    print(to_json(train_policy(config, make_env)))
     print(f"policy: {config.out / 'bundle'}; next: contactsafe evaluate {config.out / 'bundle'}")
 
 

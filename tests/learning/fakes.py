@@ -5,6 +5,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from contactsafe.sim.snapshot import Part, of_array, of_generators, put, take
+
 BOARD = np.array([0.5, 0.0])
 INK_SIDE_M = 0.30
 MASK = 128
@@ -107,6 +109,27 @@ class FakeWiping(VectorEnv):
         for i in range(self.num_envs):
             self._reset_one(i)
         return self._observe(), self._info(np.zeros(self.num_envs), np.zeros(self.num_envs))
+
+    def _parts(self):
+        return {
+            "rngs": of_generators(self.rngs),
+            "xy": of_array(self.xy),
+            "steps": of_array(self.steps),
+            "boards": Part(lambda: [{**vars(board)} for board in self.boards], self._set_boards),
+        }
+
+    def _set_boards(self, values):
+        self.boards = [Board(np.random.default_rng(0)) for _ in values]
+        for board, value in zip(self.boards, values, strict=True):
+            vars(board).update(value)
+
+    def snapshot(self):
+        """All that decides the future."""
+        return take(self._parts())
+
+    def restore(self, snapshot):
+        """Put it back."""
+        put(self._parts(), snapshot)
 
     def _reset_one(self, i):
         self.boards[i] = Board(self.rngs[i], strokes=1)

@@ -10,14 +10,13 @@ pytestmark = pytest.mark.train
 torch = pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from tests.learning.fakes import BOARD, FakeWiping, camera_homography, sample_masks  # noqa: E402
+from tests.learning.fakes import BOARD, FakeWiping  # noqa: E402
 
 from contactsafe.errors import InvalidInputError  # noqa: E402
+from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
 from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
-from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
-from contactsafe.learning.train_ppo import PpoConfig, train_ppo  # noqa: E402
-from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
+from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling  # noqa: E402
 
 SCALING = ObservationScaling.from_statistics((0.5, 0, 0, 0, 0, 0), (0.15,) * 6, np.zeros(128), np.ones(128))
@@ -119,33 +118,24 @@ def test_what_the_adapter_refuses():
     assert str(error.value) == "action_repeat = 0; give 1 or more"
 
 
-@pytest.fixture(scope="module")
-def vae(tmp_path_factory):
-    out = tmp_path_factory.mktemp("vae") / "run"
-    encoder = EncoderConfig(size=32, channels=(4, 4, 8))
-    config = VaeConfig(out=out, encoder=encoder, images=64, held_out=16, epochs=1, batch=16, threads=1, probe_steps=0)
-    train_vae(config, sample_masks, camera_homography())
-    return out
-
-
 def ppo_config(vae, out, **changes):
     settings = {"num_envs": 4, "total_steps": 256, "rollout_steps": 16, "batch": 32, "epochs": 2, "net": (16, 16)}
-    settings |= {"checkpoint_rollouts": 1, "evaluate_episodes": 4}
-    return PpoConfig(vae=vae, out=out, **{**settings, **changes})
+    return PpoConfig(vae=vae, out=out, **{**settings, "evaluate_episodes": 4, **changes})
 
 
 def test_trains_resumes_and_ships(vae, tmp_path):
     config = ppo_config(vae, tmp_path / "run")
-    results = train_ppo(config, FakeWiping)
+    results = train_policy(config, FakeWiping)
     assert results["episodes"] == 4
     state = load_checkpoint(config.out)
-    assert state["steps"] == 256
+    assert state["counters"]["num_timesteps"] == 256
     longer = dataclasses.replace(config, resume=True, total_steps=512)
-    train_ppo(longer, FakeWiping)
+    train_policy(longer, FakeWiping)
     resumed = load_checkpoint(config.out)
-    assert resumed["steps"] == 512
-    assert resumed["updates"] == 2 * state["updates"] == 16
-    assert not torch.equal(resumed["policy"]["action_net.weight"], state["policy"]["action_net.weight"])
+    assert resumed["counters"]["num_timesteps"] == 512
+    assert resumed["counters"]["_n_updates"] == 2 * state["counters"]["_n_updates"] == 16
+    before, after = (run["parameters"]["policy"]["action_net.weight"] for run in (state, resumed))
+    assert not torch.equal(before, after)
     manifest = Bundle.load(config.out / "bundle").manifest
     assert manifest["training"]["steps"] == 512
     assert manifest["training"]["ppo"]["discount"] == 0.995
@@ -154,28 +144,28 @@ def test_trains_resumes_and_ships(vae, tmp_path):
     assert list(config.out.glob("events.out.tfevents*"))
     json.loads((config.out / "config.json").read_text())
     with pytest.raises(InvalidInputError, match=r"the run was started with discount = 0\.995, now it is 0\.9"):
-        train_ppo(dataclasses.replace(longer, discount=0.9), FakeWiping)
+        train_policy(dataclasses.replace(longer, discount=0.9), FakeWiping)
 
 
 def test_resuming_restores_policy_optimiser_and_chance(vae, tmp_path):
     """A finished run, resumed with nothing left to do, exports the policy of its checkpoint."""
     config = ppo_config(vae, tmp_path / "run", evaluate_episodes=0)
-    train_ppo(config, FakeWiping)
+    train_policy(config, FakeWiping)
     before = (config.out / "bundle" / "policy.onnx").read_bytes()
-    train_ppo(dataclasses.replace(config, resume=True), FakeWiping)
+    train_policy(dataclasses.replace(config, resume=True), FakeWiping)
     assert (config.out / "bundle" / "policy.onnx").read_bytes() == before
 
 
 def test_stops_in_time_and_keeps_what_it_has(vae, tmp_path):
     config = ppo_config(vae, tmp_path / "run", total_steps=10_000_000, max_minutes=0.02, evaluate_episodes=0)
-    train_ppo(config, FakeWiping)
-    assert 0 < load_checkpoint(config.out)["steps"] < 10_000_000
+    train_policy(config, FakeWiping)
+    assert 0 < load_checkpoint(config.out)["counters"]["num_timesteps"] < 10_000_000
     Bundle.load(config.out / "bundle")
 
 
 def test_without_an_encoder_it_says_what_to_do(tmp_path):
     with pytest.raises(InvalidInputError) as error:
-        train_ppo(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
+        train_policy(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
     assert str(error.value) == (
         f"{tmp_path} holds no trained encoder (encoder.onnx, vae.json); run `contactsafe train vae` first"
     )
@@ -196,7 +186,7 @@ def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
     config = ppo_config(
         vae, tmp_path / "run", num_envs=16, total_steps=12_288, rollout_steps=32, batch=128, epochs=6,
         learning_rate=2e-3, net=(64, 64), target_kl=0.05, pose_scale=(0.15, 0.15, 0.03, 0.05, 0.05, 0.1),
-        discount=0.95, checkpoint_rollouts=100, evaluate_episodes=16,
+        discount=0.95, evaluate_episodes=16,
     )  # fmt: skip
-    results = train_ppo(config, lambda n: Sighted(n, max_steps=40))
+    results = train_policy(config, lambda n: Sighted(n, max_steps=40))
     assert results["ink_removed_mean"] > 0.6

@@ -1,6 +1,7 @@
 """N wiping tasks stepped together: what the single and the vector environment share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.snapshot import Part, of_object, of_records, put, take
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 
 ACTION_SIZE = 18
@@ -94,6 +96,18 @@ class WipingTasks:
         """Look again at world i, after its board was changed by hand."""
         worlds = self.worlds
         observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i])
+
+    def parts(self) -> dict[str, Part]:
+        """List what decides the tasks' future."""
+        return {"worlds": of_object(self.worlds), "tasks": of_records(self.tasks)}
+
+    def snapshot(self) -> dict[str, Any]:
+        """Take all that decides the tasks' future, as plain values and arrays."""
+        return take(self.parts())
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Put the tasks where a snapshot was taken; see `Worlds.restore`."""
+        put(self.parts(), snapshot)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
         """Find joint positions for a tool pose, near those over the board's centre, (n,), rad."""

@@ -1,5 +1,6 @@
 """The wiping task for Gymnasium: one environment, or many stepped in native threads."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -10,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.errors import InvalidInputError
+from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
 from contactsafe.sim.world import POLICY_RATE_HZ
 
 VECTORS = {"pose": 6, "target": 18, "force": 3}
@@ -146,6 +148,22 @@ class WipingVectorEnv(gymnasium.vector.VectorEnv):
         return info | {
             "final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended.copy(),
         }  # fmt: skip
+
+    def parts(self) -> dict[str, Part]:
+        """List what decides the environment's future."""
+        return {"tasks": of_object(self.tasks), "episodes": of_generators(self._rngs)}
+
+    def snapshot(self) -> dict[str, Any]:
+        """Take all that decides the environment's future, as plain values and arrays."""
+        return take(self.parts())
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Put the environment where a snapshot of one made alike was taken: it goes on as that did, to the bit.
+
+        Raises:
+            InvalidInputError: it is of another environment, or of another version.
+        """
+        put(self.parts(), snapshot)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the native threads."""

@@ -50,7 +50,7 @@ def write_json(path, value):
 
 
 def prepare_folder(out, resume):
-    """Make the folder of a run, or find the one to go on with.
+    """Make the folder of a run, or find the one to go on with, and make sure that it can be written to.
 
     Args:
         out: the folder.
@@ -60,7 +60,7 @@ def prepare_folder(out, resume):
         The folder as a Path.
 
     Raises:
-        OutputError: it holds a run already and resume is false, or it cannot be made.
+        OutputError: it holds a run already and resume is false, or it cannot be made or written to.
         InvalidInputError: resume is true and there is no checkpoint.
     """
     out = Path(out)
@@ -70,14 +70,17 @@ def prepare_folder(out, resume):
         raise OutputError(f"{out} holds a training run already; give --resume to go on with it, or another --out")
     try:
         out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
     except OSError as error:
-        raise OutputError(f"cannot make {out}: {error.strerror}; choose a folder you may write to") from error
+        raise OutputError(f"cannot write to {out}: {error.strerror}; choose a folder you may write to") from error
     return out
 
 
 def save_checkpoint(out, state):
-    """Write state (tensors and plain values, nested) as the checkpoint of the run in out, atomically."""
-    write_atomically(Path(out) / CHECKPOINT, lambda name: torch.save(state, name))
+    """Write state (tensors, arrays and plain values, nested) as the checkpoint of the run in out, atomically."""
+    tensors = _map(state, np.ndarray, torch.from_numpy)
+    write_atomically(Path(out) / CHECKPOINT, lambda name: torch.save(tensors, name))
 
 
 def load_checkpoint(out):
@@ -91,6 +94,20 @@ def load_checkpoint(out):
         return torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:
         raise InvalidInputError(f"{path} cannot be read as a checkpoint; start anew with another --out") from error
+
+
+def arrays(state):
+    """Turn the tensors in what `load_checkpoint` gave back into arrays."""
+    return _map(state, torch.Tensor, torch.Tensor.numpy)
+
+
+def _map(value, kind, turn):
+    """Apply turn to everything of a kind in nested dicts and lists."""
+    if isinstance(value, kind):
+        return turn(value)
+    if isinstance(value, dict):
+        return {name: _map(inner, kind, turn) for name, inner in value.items()}
+    return [_map(inner, kind, turn) for inner in value] if isinstance(value, list) else value
 
 
 def check_same_config(saved, config, may_differ):

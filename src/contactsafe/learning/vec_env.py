@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import step_values
+from contactsafe.sim.snapshot import Part, of_array, of_object, put, take
 
 MIN_STD = 0.2
 """A latent number that hardly moves is not blown up to unit variance: it would be noise."""
@@ -159,6 +160,36 @@ class EncodedVecEnv(VecEnv):
         for value in self._tally.values():
             value[done] = 0.0
         self._steps[done] = 0
+
+    @property
+    def keeps_worlds(self):
+        """Whether the environment below has `snapshot` and `restore`; without, a resumed run begins new episodes."""
+        return hasattr(self.env.unwrapped, "snapshot")
+
+    def parts(self):
+        """List what decides the future, but for the observation that was given last."""
+        worlds = {"worlds": of_object(self.env.unwrapped)} if self.keeps_worlds else {}
+        return worlds | {
+            "steps": of_array(self._steps),
+            "tally": Part(lambda: {key: value.copy() for key, value in self._tally.items()}, self._set_tally),
+            "finished": Part(lambda: list(self.finished), self._set_finished),
+        }
+
+    def snapshot(self):
+        """Take all that decides the future, as plain values and arrays."""
+        return take(self.parts())
+
+    def restore(self, snapshot):
+        """Put back what `snapshot` gave; the seed kept for the next reset is forgotten."""
+        put(self.parts(), snapshot)
+        self._seed = None
+
+    def _set_tally(self, tally):
+        self._tally = {key: value.copy() for key, value in tally.items()}
+
+    def _set_finished(self, episodes):
+        self.finished.clear()
+        self.finished.extend(episodes)
 
     def close(self):
         """Close the environment below."""

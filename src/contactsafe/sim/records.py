@@ -14,10 +14,12 @@ from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig, per_joint
 _f = np.float64
 _i = np.int64
 
-_VIEWED = (
+VIEWED = (
     "ctrl", "qfrc_applied", "qfrc_constraint", "qpos", "qvel", "sensordata", "xpos", "xmat", "geom_xpos", "geom_xmat",
     "site_xpos", "site_xmat",
 )  # fmt: skip
+"""Arrays of MjData that compiled code reads or writes."""
+
 _SENSORS = (
     "wrist_force", "wrist_torque", "wrist_accelerometer", "pad_board", "pad_table", "arm_board", "arm_table",
 )  # fmt: skip
@@ -31,7 +33,7 @@ def noise_channels(n: int) -> int:
 def plant_dtype(n: int) -> np.dtype:
     """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
     return np.dtype(
-        [(name, np.uintp) for name in ("model", "data", *_VIEWED, "qpos_spring")]
+        [(name, np.uintp) for name in ("model", "data", *VIEWED, "qpos_spring")]
         + [
             (name, _i)
             for name in ("nq", "nv", "nbody", "ngeom", "nsensordata", "tcp_site", "n_obstacles", "delay_ticks", "tick")
@@ -116,7 +118,7 @@ def trace_dtype(n: int) -> np.dtype:
 def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, config: WorldConfig) -> None:
     """Fill a `plant_dtype` record; the caller keeps model and data alive."""
     plant["model"], plant["data"] = model._address, data._address
-    for name in _VIEWED:
+    for name in VIEWED:
         plant[name] = getattr(data, name).ctypes.data
     plant["qpos_spring"] = model.qpos_spring.ctypes.data
     for name in ("nq", "nv", "nbody", "ngeom", "nsensordata"):

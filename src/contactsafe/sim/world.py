@@ -1,8 +1,9 @@
 """Simulated worlds: an arm under its controller before a whiteboard, one or many, stepped natively."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,6 +18,7 @@ from contactsafe.sim.camera import camera_tables, plane_homography, render_mask
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.records import fill_plant, noise_channels, plant_dtype, report_dtype, trace_dtype
 from contactsafe.sim.scene import build_plant
+from contactsafe.sim.snapshot import Part, of_array, of_generators, of_physics, of_records, put, take
 from contactsafe.sim.stepping import run_ticks
 from contactsafe.sim.whiteboard import INK, Whiteboard
 
@@ -164,6 +166,30 @@ class Worlds:
         """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
         self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
         mujoco.mj_kinematics(self.models[i], self.datas[i])
+
+    def parts(self) -> dict[str, Part]:
+        """List what decides the worlds' future, in the order in which it must be put back."""
+        return {
+            "physics": of_physics(self.models, self.datas),
+            "plants": of_records(self.plants),
+            "controllers": of_records(self.controllers),
+            "reports": of_records(self.reports),
+            "cells": of_array(self.cells),
+            "masks": of_array(self.masks),
+            "noise": of_generators(self.rngs),
+        }
+
+    def snapshot(self) -> dict[str, Any]:
+        """Take all that decides the worlds' future, as plain values and arrays; see `contactsafe.sim.snapshot`."""
+        return take(self.parts())
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Put the worlds where a snapshot of worlds made alike was taken: they go on as those did, to the bit.
+
+        Raises:
+            InvalidInputError: it is of other worlds, or of another version.
+        """
+        put(self.parts(), snapshot)
 
     def close(self) -> None:
         """Stop the threads."""

@@ -1,0 +1,131 @@
+"""The algorithms by name: PPO and SAC of Stable-Baselines3. All that training knows of them is in this file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from stable_baselines3 import PPO, SAC
+from torch import nn
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.learning.policy_config import PolicyConfig
+
+
+@dataclass(frozen=True)
+class PpoConfig(PolicyConfig):
+    """Settings of PPO (Schulman et al. 2017), the paper's algorithm.
+
+    Attributes:
+        epochs: passes over a rollout.
+        gae_lambda: of the advantage estimate.
+        clip_range: the paper's ε.
+        entropy_weight: bonus on the entropy of the action distribution.
+        value_weight: weight of the value loss.
+        max_grad_norm: gradients are clipped to this.
+        target_kl: an update stops early when the policy moved further than this.
+        log_std_init: log of the first standard deviation of each action.
+    """
+
+    algorithm: ClassVar[str] = "ppo"
+
+    out: Path = Path("runs/ppo")
+    epochs: int = 5
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    entropy_weight: float = 0.0
+    value_weight: float = 0.5
+    max_grad_norm: float = 0.5
+    target_kl: float = 0.03
+    log_std_init: float = -1.0
+
+    def make_model(self, env):
+        """Make an untrained PPO."""
+        return PPO(
+            "MlpPolicy",
+            env,
+            learning_rate=self.falling_rate(),
+            n_steps=self.rollout_steps,
+            batch_size=self.batch,
+            n_epochs=self.epochs,
+            gamma=self.discount**self.action_repeat,
+            gae_lambda=self.gae_lambda,
+            clip_range=self.clip_range,
+            ent_coef=self.entropy_weight,
+            vf_coef=self.value_weight,
+            max_grad_norm=self.max_grad_norm,
+            target_kl=self.target_kl,
+            policy_kwargs={
+                "net_arch": {"pi": list(self.net), "vf": list(self.net)},
+                "activation_fn": nn.Tanh,
+                "log_std_init": self.log_std_init,
+            },
+            seed=self.seed,
+            device="cpu",
+        )
+
+    def actor(self, model):
+        """Give the mean of the action distribution."""
+        return nn.Sequential(model.policy.mlp_extractor.policy_net, model.policy.action_net)
+
+
+@dataclass(frozen=True)
+class SacConfig(PolicyConfig):
+    """Settings of SAC (Haarnoja et al. 2018).
+
+    Attributes:
+        buffer: transitions remembered, over all environments; 1.2 kB each in memory, and as much on disk.
+        learning_starts: steps with actions drawn at random before the first update.
+        update_every: steps of each environment between updates.
+        gradient_steps: gradient steps of an update.
+        target_share: of the way that the target networks go towards the critics in a gradient step.
+        entropy_start: first weight of the entropy; it is then tuned to an entropy of minus the number of actions.
+    """
+
+    algorithm: ClassVar[str] = "sac"
+
+    out: Path = Path("runs/sac")
+    batch: int = 256
+    net: tuple[int, ...] = (256, 256)
+    buffer: int = 300_000
+    learning_starts: int = 10_000
+    update_every: int = 1
+    gradient_steps: int = 4
+    target_share: float = 0.005
+    entropy_start: float = 0.1
+
+    def __post_init__(self):
+        """Refuse a memory that is gone before it is saved."""
+        super().__post_init__()
+        least = 2 * self.num_envs * max(self.rollout_steps, self.update_every)
+        if self.buffer < least:
+            raise InvalidInputError(f"buffer = {self.buffer}; give {least} or more: two rollouts of every environment")
+        for name in ("update_every", "gradient_steps"):
+            if getattr(self, name) < 1:
+                raise InvalidInputError(f"{name} = {getattr(self, name)}; give 1 or more")
+
+    def make_model(self, env):
+        """Make an untrained SAC."""
+        return SAC(
+            "MlpPolicy",
+            env,
+            learning_rate=self.falling_rate(),
+            buffer_size=self.buffer,
+            learning_starts=self.learning_starts,
+            batch_size=self.batch,
+            tau=self.target_share,
+            gamma=self.discount**self.action_repeat,
+            train_freq=self.update_every,
+            gradient_steps=self.gradient_steps,
+            ent_coef=f"auto_{self.entropy_start}",
+            policy_kwargs={"net_arch": list(self.net)},
+            seed=self.seed,
+            device="cpu",
+        )
+
+    def actor(self, model):
+        """Give the squashed mean of the action distribution."""
+        return nn.Sequential(model.actor.latent_pi, model.actor.mu, nn.Tanh())
+
+
+ALGORITHMS = {config.algorithm: config for config in (PpoConfig, SacConfig)}
+"""Settings by name of the algorithm, as the command line offers them."""

@@ -1,0 +1,109 @@
+"""Settings that every way of training a policy shares, and what an algorithm must say of itself."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from contactsafe.errors import InvalidInputError
+
+SESSION_FIELDS = (
+    "vae",
+    "out",
+    "resume",
+    "total_steps",
+    "max_minutes",
+    "evaluate_episodes",
+    "threads",
+    "encoder_threads",
+)
+"""Settings that may change when a run goes on."""
+
+Six = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class PolicyConfig:
+    """Settings that do not depend on the algorithm.
+
+    An algorithm of Stable-Baselines3 is a subclass with its own settings, a name, `make_model` and `actor`, such as
+    `PpoConfig`.
+
+    Attributes:
+        vae: folder of the trained encoder (encoder.onnx, vae.json).
+        out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
+        resume: go on from the checkpoint in out, as if the run had never stopped.
+        env_id: Gymnasium id of the task.
+        num_envs: environments side by side.
+        total_steps: steps of the policy, over all environments and sessions.
+        max_minutes: stop after this long in this session, keep a checkpoint and export what there is; 0 for no limit.
+        rollout_steps: steps of each environment between two checkpoints and points of the curves; on-policy algorithms
+            update the policy just as often.
+        batch: samples in a gradient step.
+        learning_rate: of Adam; falls linearly to a twentieth over total_steps.
+        discount: the paper's γ of RL, for one environment step; raised to action_repeat.
+        net: widths of the hidden layers, of policy and of value network.
+        action_repeat: environment steps for which one action is given.
+        reward_scale: rewards are multiplied by this before learning; logs are not.
+        pose_centre: subtracted from the pose: middle of the board, m; rad.
+        pose_scale: divided by: half the ink area along x and y, a hand's breadth of height, m; rad.
+        rate_hz: of environment steps.
+        evaluate_episodes: on boards never trained on, at the end; 0 for none.
+        seed: of weights, exploration and boards.
+        threads: torch's. More than one crawls as soon as anything else wants a core.
+        encoder_threads: ONNX Runtime's.
+    """
+
+    algorithm: ClassVar[str]
+
+    vae: Path = Path("runs/vae")
+    out: Path = Path("runs/policy")
+    resume: bool = False
+    env_id: str = "contactsafe/Wiping-v0"
+    num_envs: int = 16
+    total_steps: int = 3_000_000
+    max_minutes: float = 0.0
+    rollout_steps: int = 256
+    batch: int = 512
+    learning_rate: float = 3e-4
+    discount: float = 0.995
+    net: tuple[int, ...] = (256, 128)
+    action_repeat: int = 1
+    reward_scale: float = 1.0
+    pose_centre: Six = (0.5, 0.0, 0.01, 0.0, 0.0, 0.0)
+    pose_scale: Six = (0.15, 0.15, 0.03, 0.1, 0.1, 0.1)
+    rate_hz: float = 60.0
+    evaluate_episodes: int = 64
+    seed: int = 0
+    threads: int = 1
+    encoder_threads: int = 2
+
+    def __post_init__(self):
+        """Refuse numbers with which nothing can be trained."""
+        for name in ("num_envs", "total_steps", "rollout_steps", "batch", "action_repeat", "threads"):
+            if getattr(self, name) < 1:
+                raise InvalidInputError(f"{name} = {getattr(self, name)}; give 1 or more")
+        for name in ("max_minutes", "evaluate_episodes", "seed"):
+            if not getattr(self, name) >= 0:
+                raise InvalidInputError(f"{name} = {getattr(self, name)}; give 0 or more")
+        if not 0.0 < self.discount <= 1.0:
+            raise InvalidInputError(f"discount = {self.discount}; give more than 0, at most 1")
+
+    def make_model(self, env: Any) -> Any:
+        """Make an untrained model of Stable-Baselines3, on the CPU, seeded.
+
+        Args:
+            env: the EncodedVecEnv.
+        """
+        raise NotImplementedError
+
+    def actor(self, model: Any) -> Any:
+        """Give the part of a model that acts without exploring: a torch module, (N, observation) to (N, 18).
+
+        Actions are clipped to [-1, 1] by who uses it.
+        """
+        raise NotImplementedError
+
+    def falling_rate(self) -> Callable[[float], float]:
+        """Give the learning rate by the share of total_steps still ahead: absolute, so a resumed run has the same."""
+        return lambda remaining: self.learning_rate * max(remaining, 0.05)

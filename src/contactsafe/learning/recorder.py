@@ -1,0 +1,100 @@
+"""What happens beside the learning: curves, progress, checkpoints, and the time allowed."""
+
+import time
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import KVWriter
+from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
+
+
+class Curves(KVWriter):
+    """TensorBoard's log of a run; points that a killed session wrote after its last checkpoint are hidden.
+
+    Args:
+        folder: of the run.
+        steps: at which the session begins.
+    """
+
+    def __init__(self, folder, steps):
+        self._writer = SummaryWriter(str(folder), purge_step=steps + 1)
+
+    def write(self, key_values, key_excluded, step=0):
+        """Write numbers, and have them on disk before the checkpoint that follows."""
+        for key, value in key_values.items():
+            if "tensorboard" not in (key_excluded.get(key) or ()):
+                self._writer.add_scalar(key, value, step)
+        self._writer.flush()
+
+    def close(self):
+        """Close the file."""
+        self._writer.close()
+
+
+class Recorder(BaseCallback):
+    """Logs, shows progress and saves once a rollout, between updates; stops there when time is up.
+
+    Args:
+        run: the Run.
+        minutes_before: trained in earlier sessions.
+    """
+
+    def __init__(self, run, minutes_before):
+        super().__init__()
+        self.run = run
+        self.config = run.config
+        self.minutes_before = minutes_before
+        self.started = time.monotonic()
+        self.period = run.config.rollout_steps * run.config.num_envs
+        self.over = False
+        self.bar = tqdm(disable=True)
+
+    def minutes(self):
+        """Time trained over all sessions, min."""
+        return self.minutes_before + self._session_minutes()
+
+    def finish(self):
+        """Log and save the last rollout, unless that was done."""
+        if not self.over and self.model.num_timesteps > self.run.saved_steps:
+            self._close_rollout()
+        self.logger.close()
+
+    def _on_training_start(self):
+        name = self.config.algorithm.upper()
+        self.bar = tqdm(
+            total=self.config.total_steps, initial=self.model.num_timesteps, desc=name, unit="step", mininterval=1.0
+        )
+
+    def _on_rollout_start(self):
+        # The one place where Stable-Baselines3 calls back with nothing half done: no rollout begun, no update pending.
+        limit = self.config.max_minutes
+        self.over = bool(limit) and self._session_minutes() >= limit
+        steps, saved = self.model.num_timesteps, self.run.saved_steps
+        if saved < 0 or steps - saved >= self.period or (self.over and steps > saved):
+            self._close_rollout()
+
+    def _on_step(self):
+        self.bar.update(self.training_env.num_envs)
+        return not self.over
+
+    def _on_training_end(self):
+        self.bar.close()
+
+    def _session_minutes(self):
+        return (time.monotonic() - self.started) / 60.0
+
+    def _close_rollout(self):
+        if self.model.num_timesteps:
+            self._log()
+        self.run.save(self.minutes())
+
+    def _log(self):
+        finished = self.training_env.finished
+        for key in finished[-1] if finished else ():
+            self.logger.record(f"episode/{key}", float(np.mean([episode[key] for episode in finished])))
+        self.logger.record("time/minutes", self.minutes())
+        if finished:
+            recent = {key: np.mean([episode[key] for episode in finished]) for key in ("success", "ink_left", "return")}
+            self.bar.set_postfix({key: f"{value:.2f}" for key, value in recent.items()}, refresh=False)
+        self.model.dump_logs()

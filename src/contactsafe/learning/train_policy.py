@@ -1,0 +1,144 @@
+"""Train a policy on [pose, latent] with any algorithm of Stable-Baselines3, the free-space controller underneath."""
+
+import json
+from dataclasses import dataclass
+
+import gymnasium
+import torch
+from stable_baselines3.common.logger import Logger
+from tqdm import tqdm
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.learning.bundle import digest
+from contactsafe.learning.checkpoints import plain, prepare_folder, write_json
+from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
+from contactsafe.learning.export import export_bundle
+from contactsafe.learning.perception import Perception, open_session
+from contactsafe.learning.policy import Policy
+from contactsafe.learning.recorder import Curves, Recorder
+from contactsafe.learning.run import Run, load_run
+from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling
+
+
+def train_policy(config, make_env=None):
+    """Train, export a bundle, and evaluate it on held-out boards.
+
+    Killed at any moment and resumed, a run ends with the same weights as one that was left alone: on one machine, with
+    the same versions, as many threads, and an environment that has `snapshot` and `restore`.
+
+    Args:
+        config: a PolicyConfig of some algorithm, such as PpoConfig.
+        make_env: `make_env(num_envs)` gives the vector environment; None makes config.env_id through Gymnasium.
+
+    Returns:
+        The results written into the bundle, a dict.
+
+    Raises:
+        InvalidInputError: no encoder in config.vae, nothing to resume, or the run was started otherwise.
+        OutputError: out cannot be written, or holds another run.
+    """
+    eyes = _Eyes.load(config.vae)
+    out = prepare_folder(config.out, config.resume)
+    state = load_run(config, eyes.digest) if config.resume else None
+    write_json(out / "config.json", plain(config))
+    make_env = make_env or (lambda num_envs: gymnasium.make_vec(config.env_id, num_envs=num_envs))
+    torch.set_num_threads(config.threads)
+    env = _encoded(make_env(config.num_envs), eyes, config)
+    try:
+        model, effort = _learn(config, env, eyes, state)
+    finally:
+        env.close()
+    layers, description = config.actor(model), _describe(config, eyes, effort)
+    folder = export_bundle(out / "bundle", eyes.encoder, layers, env.scaling, description, force=True)
+    if config.evaluate_episodes:
+        description["results"] = _evaluate(folder, make_env, config)
+        export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
+    return description["results"]
+
+
+@dataclass(frozen=True)
+class _Eyes:
+    """A trained encoder: bytes of encoder.onnx, what vae.json says, SHA-256 of both."""
+
+    encoder: bytes
+    vae: dict
+    digest: str
+
+    @classmethod
+    def load(cls, folder):
+        try:
+            encoder, text = (folder / "encoder.onnx").read_bytes(), (folder / "vae.json").read_bytes()
+            return cls(encoder, json.loads(text), digest(encoder + text))
+        except (OSError, ValueError) as error:
+            raise InvalidInputError(
+                f"{folder} holds no trained encoder (encoder.onnx, vae.json); run `contactsafe train vae` first"
+            ) from error
+
+
+def _encoded(raw_env, eyes, config):
+    vae = eyes.vae
+    session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
+    view = (vae["representation"], vae["window_m"], vae["size"])
+    perception = Perception(session, *view, _homography(raw_env))
+    scaling = ObservationScaling.from_statistics(
+        config.pose_centre, config.pose_scale, vae["latent_mean"], vae["latent_std"]
+    )
+    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale)
+
+
+def _homography(env):
+    return getattr(env, "unwrapped", env).camera_homography
+
+
+def _learn(config, env, eyes, state):
+    """Give the trained model, and how many steps and minutes it took over all sessions."""
+    model = config.make_model(env)
+    run = Run(config, model, env, eyes.digest)
+    recorder = Recorder(run, 0.0 if state is None else run.restore(state))
+    # Stable-Baselines3 adds these to the steps done: its total, which the learning rate falls by, stays total_steps.
+    remaining = config.total_steps - model.num_timesteps
+    if remaining > 0:
+        model.set_logger(Logger(str(config.out), [Curves(config.out, model.num_timesteps)]))
+        model.learn(remaining, callback=recorder, log_interval=None, reset_num_timesteps=False)
+        recorder.finish()
+    return model, {"steps": run.saved_steps, "minutes": round(recorder.minutes(), 1)}
+
+
+def _describe(config, eyes, effort):
+    return {
+        "representation": eyes.vae["representation"],
+        "window_m": eyes.vae["window_m"],
+        "view_size": eyes.vae["size"],
+        "rate_hz": config.rate_hz,
+        "action_repeat": config.action_repeat,
+        "training": {
+            config.algorithm: _portable(plain(config)),
+            "vae": {
+                key: _portable(value) if key == "config" else value
+                for key, value in eyes.vae.items()
+                if not key.startswith("latent_")
+            },
+            **effort,
+        },
+        "results": {},
+    }
+
+
+def _portable(settings):
+    """Leave out what names folders of this machine, or this session only."""
+    return {key: value for key, value in settings.items() if key not in ("vae", "out", "resume")}
+
+
+def _evaluate(folder, make_env, config):
+    env = make_env(min(config.num_envs, config.evaluate_episodes))
+    try:
+        policy = Policy(folder, _homography(env))
+        with tqdm(total=config.evaluate_episodes, desc="held-out boards", unit="episode") as bar:
+            seed = config.seed + HELD_OUT_SEED
+            results = evaluate_policy(
+                policy, env, config.evaluate_episodes, seed, config.rate_hz, lambda _: bar.update()
+            )
+    finally:
+        env.close()
+    del results["records"]
+    return {**results, "seed": seed}

@@ -1,0 +1,53 @@
+"""Train in a process of its own that is killed amidst it: python -m tests.learning.killed_run (see the end)."""
+
+import os
+import pickle
+import signal
+import sys
+from pathlib import Path
+
+from contactsafe.learning import checkpoints
+from contactsafe.learning.train_policy import train_policy
+
+
+def dying(make_env, calls):
+    """Make environments whose process is killed amidst a call to `step`."""
+
+    def make(num_envs):
+        env = make_env(num_envs)
+        step, count = env.step, iter(range(calls))
+
+        def step_until(actions):
+            if next(count, None) is None:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return step(actions)
+
+        env.step = step_until
+        return env
+
+    return make
+
+
+def die_while_saving(saves):
+    """Have the process killed with a checkpoint half written."""
+    save, count = checkpoints.torch.save, iter(range(saves))
+
+    def save_half(state, name):
+        save(state, name)
+        if next(count, None) is None:
+            os.truncate(name, 1000)
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    checkpoints.torch.save = save_half
+
+
+def main(path):
+    """Train as the pickled (config, make_env, calls, saves) at a path says; None for never."""
+    config, make_env, calls, saves = pickle.loads(Path(path).read_bytes())
+    if saves is not None:
+        die_while_saving(saves)
+    train_policy(config, make_env if calls is None else dying(make_env, calls))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
