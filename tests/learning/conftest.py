@@ -13,6 +13,7 @@ def vae(tmp_path_factory):
 
     out = tmp_path_factory.mktemp("vae") / "run"
     encoder = EncoderConfig(size=32, channels=(4, 4, 8))
-    config = VaeConfig(out=out, encoder=encoder, images=64, held_out=16, epochs=1, batch=16, threads=1, probe_steps=0)
+    small = {"images": 64, "held_out": 16, "epochs": 1, "batch": 16, "threads": 1, "probe_steps": 0}
+    config = VaeConfig(out=out, representation="tool", encoder=encoder, **small)
     train_vae(config, sample_masks, camera_homography())
     return out

@@ -94,6 +94,8 @@ class FakeWiping(VectorEnv):
         self.camera_homography = camera_homography()
         self.single_observation_space = gymnasium.spaces.Dict(
             pose=gymnasium.spaces.Box(-np.inf, np.inf, (6,), np.float32),
+            target=gymnasium.spaces.Box(-np.inf, np.inf, (18,), np.float32),
+            force=gymnasium.spaces.Box(-np.inf, np.inf, (3,), np.float32),
             mask=gymnasium.spaces.Box(0, 255, (MASK, MASK, 1), np.uint8),
         )
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
@@ -139,7 +141,12 @@ class FakeWiping(VectorEnv):
     def _observe(self):
         pose = np.zeros((self.num_envs, 6), np.float32)
         pose[:, :2] = self.xy
-        return {"pose": pose, "mask": np.stack([b.mask(self.camera_homography) for b in self.boards])[..., None]}
+        return {
+            "pose": pose,
+            "target": np.zeros((self.num_envs, 18), np.float32),
+            "force": np.zeros((self.num_envs, 3), np.float32),
+            "mask": np.stack([b.mask(self.camera_homography) for b in self.boards])[..., None],
+        }
 
     def _info(self, ink, distance):
         left = np.array([b.left for b in self.boards])

@@ -17,11 +17,11 @@ from tests.learning.fakes import FakeWiping  # noqa: E402
 
 from contactsafe.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import ALGORITHMS, PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.bundle import Bundle  # noqa: E402
+from contactsafe.learning.bundle import OBSERVED, Bundle  # noqa: E402
+from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.policy_config import PolicyConfig  # noqa: E402
 from contactsafe.learning.replay import ReplayFile  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
-from contactsafe.learning.vec_env import ObservationScaling  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "total_steps": 256, "evaluate_episodes": 4}
 
@@ -60,10 +60,13 @@ def test_the_bundle_acts_as_the_model_does(config, vae, tmp_path, monkeypatch):
     assert bundle.manifest["training"]["steps"] == 256
     assert bundle.manifest["results"]["episodes"] == 4
     rng = np.random.default_rng(0)
-    pose, latent = rng.normal(size=(9, 6)).astype(np.float32), rng.normal(size=(9, 128)).astype(np.float32)
-    scaling = ObservationScaling(**bundle.manifest["observation_scaling"])
-    wanted, _ = models[0].predict(scaling(pose, latent), deterministic=True)
-    found = bundle.policy.run(None, {"pose": pose, "latent": latent})[0]
+    seen = {name: rng.normal(size=(9, k)).astype(np.float32) for name, k in OBSERVED.items()}
+    latent = rng.normal(size=(9, 128)).astype(np.float32)
+    observes = bundle.manifest["observes"]
+    scaling = ObservationScaling(observes, **bundle.manifest["observation_scaling"])
+    wanted, _ = models[0].predict(scaling(seen, latent), deterministic=True)
+    state = np.concatenate([seen[name] for name in observes], axis=1)
+    found = bundle.policy.run(None, {"state": state, "latent": latent})[0]
     np.testing.assert_allclose(found, wanted, atol=1e-5)
 
 

@@ -17,8 +17,8 @@ from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError,
 from contactsafe.learning.bundle import OBSERVED, Bundle, digest  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
+from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.policy import Policy  # noqa: E402
-from contactsafe.learning.vec_env import ObservationScaling  # noqa: E402
 
 H = camera_homography()
 DESCRIPTION = {
@@ -38,7 +38,7 @@ def networks():
     torch.manual_seed(0)
     layers = torch.nn.Sequential(torch.nn.Linear(134, 16), torch.nn.Tanh(), torch.nn.Linear(16, 18))
     torch.nn.init.normal_(layers[-1].weight, std=2.0)
-    scaling = ObservationScaling.from_statistics((0.5, 0, 0, 0, 0, 0), (0.1,) * 6, np.zeros(128), np.ones(128))
+    scaling = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
     return VAE(EncoderConfig(size=32, channels=(4, 4, 8))), layers, scaling
 
 
@@ -90,7 +90,7 @@ def test_acts_as_the_trained_networks_do(exported):
     with torch.no_grad():
         views = torch.from_numpy(rectify(seen["mask"], seen["pose"], H, 0.64, 32))
         latent = MaskEncoder(vae)(views)
-        scaled = torch.from_numpy(scaling(seen["pose"], latent.numpy()))
+        scaled = torch.from_numpy(scaling(seen, latent.numpy()))
         wanted = layers(scaled).clamp(-1, 1).numpy()
     np.testing.assert_allclose(Policy(exported, H).act(seen), wanted, atol=1e-5)
     assert (np.abs(wanted) == 1.0).any()
@@ -133,7 +133,7 @@ def foveated_bundle(folder, observes):
     torch.manual_seed(0)
     k = sum(OBSERVED[name] for name in observes)
     layers = torch.nn.Sequential(torch.nn.Linear(k + FEATURES, 18))
-    scaling = ObservationScaling((0.0,) * (k + FEATURES), (1.0,) * (k + FEATURES))
+    scaling = ObservationScaling(observes, (0.0,) * (k + FEATURES), (1.0,) * (k + FEATURES))
     eyes = {"representation": "foveated", "view_size": 128, "latent_size": FEATURES, "observes": observes}
     return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **eyes})
 

@@ -16,10 +16,11 @@ from contactsafe.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
 from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
+from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
-from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling  # noqa: E402
+from contactsafe.learning.vec_env import EncodedVecEnv  # noqa: E402
 
-SCALING = ObservationScaling.from_statistics((0.5, 0, 0, 0, 0, 0), (0.15,) * 6, np.zeros(128), np.ones(128))
+SCALING = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
 
 
 def no_perception(masks, poses):
@@ -167,7 +168,8 @@ def test_without_an_encoder_it_says_what_to_do(tmp_path):
     with pytest.raises(InvalidInputError) as error:
         train_policy(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
     assert str(error.value) == (
-        f"{tmp_path} holds no trained encoder (encoder.onnx, vae.json); run `contactsafe train vae` first"
+        f"{tmp_path} holds no eyes (vae.json, and encoder.onnx where they are learned); "
+        f"run `contactsafe train vae --out {tmp_path}` first"
     )
     assert not (tmp_path / "run").exists()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.learning.observation import SCALES
 
 SESSION_FIELDS = (
     "vae",
@@ -19,8 +20,6 @@ SESSION_FIELDS = (
 )
 """Settings that may change when a run goes on."""
 
-Six = tuple[float, float, float, float, float, float]
-
 
 @dataclass(frozen=True)
 class PolicyConfig:
@@ -30,7 +29,7 @@ class PolicyConfig:
     `PpoConfig`.
 
     Attributes:
-        vae: folder of the trained encoder (encoder.onnx, vae.json).
+        vae: folder of the eyes, as `contactsafe train vae` leaves them (vae.json; encoder.onnx where it is learned).
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         env_id: Gymnasium id of the task.
@@ -45,8 +44,8 @@ class PolicyConfig:
         net: widths of the hidden layers, of policy and of value network.
         action_repeat: environment steps for which one action is given.
         reward_scale: rewards are multiplied by this before learning; logs are not.
-        pose_centre: subtracted from the pose: middle of the board, m; rad.
-        pose_scale: divided by: half the ink area along x and y, a hand's breadth of height, m; rad.
+        observes: what the policy takes besides the picture: pose (the paper's), target (x_d, K1 and D1 as they are
+            now) and force; without the latter two it can neither know how stiff it is nor feel what it touches.
         rate_hz: of environment steps.
         evaluate_episodes: on boards never trained on, at the end; 0 for none.
         seed: of weights, exploration and boards.
@@ -70,8 +69,7 @@ class PolicyConfig:
     net: tuple[int, ...] = (256, 128)
     action_repeat: int = 1
     reward_scale: float = 1.0
-    pose_centre: Six = (0.5, 0.0, 0.01, 0.0, 0.0, 0.0)
-    pose_scale: Six = (0.15, 0.15, 0.03, 0.1, 0.1, 0.1)
+    observes: tuple[str, ...] = ("pose", "target", "force")
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
@@ -86,6 +84,9 @@ class PolicyConfig:
         for name in ("max_minutes", "evaluate_episodes", "seed"):
             if not getattr(self, name) >= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 0 or more")
+        unknown = [name for name in self.observes if name not in SCALES]
+        if unknown or len(set(self.observes)) < len(self.observes):
+            raise InvalidInputError(f"observes = {self.observes}; give some of {', '.join(SCALES)}, each once")
         if not 0.0 < self.discount <= 1.0:
             raise InvalidInputError(f"discount = {self.discount}; give more than 0, at most 1")
 

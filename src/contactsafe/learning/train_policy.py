@@ -13,11 +13,12 @@ from contactsafe.learning.bundle import digest
 from contactsafe.learning.checkpoints import plain, prepare_folder, write_json
 from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
-from contactsafe.learning.perception import Perception, open_session
+from contactsafe.learning.observation import ObservationScaling
+from contactsafe.learning.perception import LEARNED, Perception, open_session
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.recorder import Curves, Recorder
 from contactsafe.learning.run import Run, load_run
-from contactsafe.learning.vec_env import EncodedVecEnv, ObservationScaling
+from contactsafe.learning.vec_env import EncodedVecEnv
 
 
 def train_policy(config, make_env=None):
@@ -58,31 +59,34 @@ def train_policy(config, make_env=None):
 
 @dataclass(frozen=True)
 class _Eyes:
-    """A trained encoder: bytes of encoder.onnx, what vae.json says, SHA-256 of both."""
+    """Eyes: bytes of encoder.onnx where there is one, what vae.json says, SHA-256 of both."""
 
-    encoder: bytes
+    encoder: bytes | None
     vae: dict
     digest: str
 
     @classmethod
     def load(cls, folder):
         try:
-            encoder, text = (folder / "encoder.onnx").read_bytes(), (folder / "vae.json").read_bytes()
-            return cls(encoder, json.loads(text), digest(encoder + text))
-        except (OSError, ValueError) as error:
+            text = (folder / "vae.json").read_bytes()
+            vae = json.loads(text)
+            encoder = (folder / "encoder.onnx").read_bytes() if vae["representation"] in LEARNED else None
+            return cls(encoder, vae, digest((encoder or b"") + text))
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise InvalidInputError(
-                f"{folder} holds no trained encoder (encoder.onnx, vae.json); run `contactsafe train vae` first"
+                f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); "
+                f"run `contactsafe train vae --out {folder}` first"
             ) from error
 
 
 def _encoded(raw_env, eyes, config):
     vae = eyes.vae
-    session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
+    session = None
+    if eyes.encoder is not None:
+        session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
     view = (vae["representation"], vae["window_m"], vae["size"])
     perception = Perception(session, *view, _homography(raw_env))
-    scaling = ObservationScaling.from_statistics(
-        config.pose_centre, config.pose_scale, vae["latent_mean"], vae["latent_std"]
-    )
+    scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
     return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale)
 
 
@@ -109,6 +113,8 @@ def _describe(config, eyes, effort):
         "representation": eyes.vae["representation"],
         "window_m": eyes.vae["window_m"],
         "view_size": eyes.vae["size"],
+        "latent_size": len(eyes.vae["latent_mean"]),
+        "observes": list(config.observes),
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
         "training": {

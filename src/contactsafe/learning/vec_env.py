@@ -1,7 +1,6 @@
 """The wiping task as Stable-Baselines3 sees it: N environments, observations already encoded and scaled."""
 
 from collections import deque
-from dataclasses import dataclass
 
 import gymnasium
 import numpy as np
@@ -12,44 +11,9 @@ from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import step_values
 from contactsafe.sim.snapshot import Part, of_array, of_object, put, take
 
-MIN_STD = 0.2
-"""A latent number that hardly moves is not blown up to unit variance: it would be noise."""
-
-
-@dataclass(frozen=True)
-class ObservationScaling:
-    """Fixed scaling of [pose, latent]; nothing that runs along, so nothing to be forgotten beside a policy.
-
-    Attributes:
-        centre: (134,) subtracted first.
-        scale: (134,) divided by.
-        clip: largest magnitude afterwards.
-    """
-
-    centre: tuple[float, ...]
-    scale: tuple[float, ...]
-    clip: float = 8.0
-
-    @classmethod
-    def from_statistics(cls, pose_centre, pose_scale, latent_mean, latent_std, clip=8.0):
-        """Join the pose's stated scaling with the latent's measured one."""
-        centre = [*pose_centre, *latent_mean]
-        scale = [*pose_scale, *np.maximum(latent_std, MIN_STD)]
-        return cls(tuple(float(c) for c in centre), tuple(float(s) for s in scale), clip)
-
-    def __call__(self, pose, latent):
-        """Scale: (N, 6) and (N, 128) to (N, 134) float32."""
-        raw = np.concatenate([pose, latent], axis=1)
-        centre, scale = np.asarray(self.centre, np.float32), np.asarray(self.scale, np.float32)
-        return np.clip((raw - centre) / scale, -self.clip, self.clip).astype(np.float32)
-
-    def as_dict(self):
-        """Give centre, scale and clip as plain values."""
-        return {"centre": list(self.centre), "scale": list(self.scale), "clip": self.clip}
-
 
 class EncodedVecEnv(VecEnv):
-    """Adapter from a gymnasium VectorEnv with Dict(pose, mask) to Stable-Baselines3.
+    """Adapter from a gymnasium VectorEnv with Dict(pose, target, force, mask) to Stable-Baselines3.
 
     A time limit is reported as such (`TimeLimit.truncated` and `terminal_observation`), so PPO bootstraps there and
     takes only a true end for an end.
@@ -90,8 +54,7 @@ class EncodedVecEnv(VecEnv):
         self._steps = np.zeros(self.num_envs, int)
 
     def _encode(self, observation):
-        pose = np.asarray(observation["pose"], np.float32)
-        return self.scaling(pose, self.perception(observation["mask"], pose))
+        return self.scaling(observation, self.perception(observation["mask"], observation["pose"]))
 
     def seed(self, seed=None):
         """Seed the next reset; environment i gets its own seed from it."""
@@ -99,7 +62,7 @@ class EncodedVecEnv(VecEnv):
         return [seed] * self.num_envs
 
     def reset(self):
-        """Start new episodes everywhere; observation (N, 134)."""
+        """Start new episodes everywhere; observation (N, k)."""
         observation, _ = self.env.reset(seed=self._seed)
         self._seed = None
         self._tally = {}
@@ -112,7 +75,7 @@ class EncodedVecEnv(VecEnv):
         self._actions = np.asarray(actions, np.float32)
 
     def step_wait(self):
-        """Step: observation (N, 134), reward (N,), done (N,), one info dict each."""
+        """Step: observation (N, k), reward (N,), done (N,), one info dict each."""
         rewards = np.zeros(self.num_envs, np.float32)
         ended = np.zeros(self.num_envs, bool)
         infos: list[dict] = [{} for _ in range(self.num_envs)]

@@ -1,7 +1,7 @@
-"""What differs from episode to episode: a table that is never quite where it was, another pad, a camera that was knocked.
+"""What differs from episode to episode: a table not quite where it was, another pad, a camera that was knocked.
 
-A policy that has met all of this carries over to a robot that nobody tuned for it. What is drawn goes into the plant and
-into what the camera sees; controller and policy are never told.
+A policy that has met all of this carries over to a robot that nobody tuned for it. What is drawn goes into the plant
+and into what the camera sees; controller and policy are never told.
 """
 
 from dataclasses import dataclass, fields
@@ -55,7 +55,8 @@ class Randomisation:
             least, most = _POSSIBLE.get(field.name, (-np.inf, np.inf))
             if not least <= low <= high <= most:
                 raise InvalidInputError(
-                    f"randomisation {field.name} = ({low}, {high}); give (low, high) with {least:g} ≤ low ≤ high ≤ {most:g}"
+                    f"randomisation {field.name} = ({low}, {high}); give (low, high) "
+                    f"with {least:g} ≤ low ≤ high ≤ {most:g}"
                 )
 
     @classmethod
@@ -121,7 +122,7 @@ def draw(config: Randomisation, cameras: int, rng: np.random.Generator) -> np.nd
     for name in draw_dtype.names or ():
         if name == "camera":
             drawn[name] = rng.integers(cameras)
-        elif draw_dtype[name].base == int:
+        elif draw_dtype[name].base.kind == "i":
             drawn[name] = rng.integers(*getattr(config, name), endpoint=True)
         else:
             drawn[name] = rng.uniform(*getattr(config, name), draw_dtype[name].shape)
