@@ -31,9 +31,9 @@ def posture(position, quat=DOWN):
     return InverseKinematics(panda()).solve(Pose(np.array(position, dtype=float), np.array(quat)), panda().home)
 
 
-def worlds_at(position, config=CALM, preset="safe", n=1, seed=0, quat=DOWN):
+def worlds_at(position, config=CALM, preset="safe", n=1, seed=0, quat=DOWN, engine=Worlds):
     """Make N worlds whose arms rest with the tool at a place, held there."""
-    worlds = Worlds(panda(), config, presets.by_name(preset), n, seed)
+    worlds = engine(panda(), config, presets.by_name(preset), n, seed)
     q = posture(position, quat)
     for i in range(n):
         worlds.reset(i, q)

@@ -97,10 +97,16 @@ def step_tasks(
     for i in range(start, stop):
         apply_action(controllers[i], limits, q_min, q_max, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
-        ink, distance = nearest_ink(cells[i], plants[i].origin, plants[i].cell, tool_position(plants[i]))
-        score(tasks[i], reports[i], rewards, ink, distance)
-        tasks[i].steps += 1
-        observe(plants[i], controllers[i], cells[i], camera, tasks[i], masks[i])
+        judge(plants[i], controllers[i], cells[i], reports[i], camera, rewards, tasks[i], masks[i])
+
+
+@compiled
+def judge(plant, controller, cells, report, camera, rewards, task, mask):
+    """Score the step that one world has run and look at it."""
+    ink, distance = nearest_ink(cells, plant.origin, plant.cell, tool_position(plant))
+    score(task, report, rewards, ink, distance)
+    task.steps += 1
+    observe(plant, controller, cells, camera, task, mask)
 
 
 @compiled

@@ -35,6 +35,9 @@ class WipingTasks:
         step_limit: policy steps of an episode.
     """
 
+    world_type: type[Worlds] = Worlds
+    """What simulates; another engine's tasks name theirs."""
+
     def __init__(
         self,
         config: WipingConfig | None = None,
@@ -44,7 +47,8 @@ class WipingTasks:
     ):
         self.config = config or WipingConfig()
         self.arm = robots.panda()
-        self.worlds = Worlds(self.arm, worlds or self.config.world, presets.by_name(self.config.controller), n, seed)
+        controller = presets.by_name(self.config.controller)
+        self.worlds = self.world_type(self.arm, worlds or self.config.world, controller, n, seed)
         self.tasks = np.zeros(n, dtype=task_dtype)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.config.world.board)
@@ -131,9 +135,12 @@ class WipingTasks:
             raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
         self._actions[:] = actions
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
+        self._advance(ticks, worlds.no_trace if traces is None else traces)
+
+    def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
+        """Run one policy step of so many ticks, (n,), under `self._actions`."""
+        worlds, arm = self.worlds, self.arm
         noise = worlds.draw_noise()
-        traces = worlds.no_trace if traces is None else traces
-        arm = self.arm
         worlds.in_threads(
             lambda start, stop: step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,

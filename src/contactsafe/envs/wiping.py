@@ -45,9 +45,10 @@ class WipingEnv(gymnasium.Env):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": POLICY_RATE_HZ}
+    task_type: type[WipingTasks] = WipingTasks
 
     def __init__(self, config: WipingConfig | None = None, render_mode: str | None = None):
-        self.tasks = WipingTasks(config)
+        self.tasks = self.task_type(config)
         self.render_mode = render_mode
         self.observation_space, self.action_space = _spaces(self.tasks.config)
 
@@ -79,6 +80,10 @@ class WipingEnv(gymnasium.Env):
             return None
         return np.kron(self.tasks.worlds.masks[0], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
 
+    def close(self) -> None:
+        """End the simulation; see `gymnasium.Env.close`."""
+        self.tasks.worlds.close()
+
 
 class WipingVectorEnv(gymnasium.vector.VectorEnv):
     """N wiping tasks stepped in native threads: `gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=N)`.
@@ -92,12 +97,13 @@ class WipingVectorEnv(gymnasium.vector.VectorEnv):
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_fps": POLICY_RATE_HZ}
+    task_type: type[WipingTasks] = WipingTasks
 
     def __init__(self, num_envs: int = 1, config: WipingConfig | None = None):
         if num_envs < 1:
             raise InvalidInputError(f"num_envs = {num_envs}; give 1 or more")
         self.num_envs = num_envs
-        self.tasks = WipingTasks(config, num_envs)
+        self.tasks = self.task_type(config, num_envs)
         self.single_observation_space, self.single_action_space = _spaces(self.tasks.config)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -17,6 +17,12 @@ _STIFF = "0.004 1"  # contact time constant, s, and damping ratio: four ticks, f
 # The pad: measured 4.8 kN/m a corner that touches, so 19 kN/m flat on the board, 10 kN/m on an edge.
 _FOAM_SOLREF, _FOAM_SOLIMP = "0.15 0.4", "0.5 0.5 0.001"
 
+TABLE_HALF_SIZE = (0.6, 0.9, 0.025)
+"""Half edges of the table, on whose upper face the board lies, m."""
+
+BOARD_HALF_THICKNESS = 0.005
+"""Half the height of the board, m."""
+
 
 def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
     """Compile the world around an arm that was built from facts.
@@ -36,7 +42,7 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0.6 -0.6 2", dir="0 0.3 -1", diffuse="0.7 0.7 0.7")
     _board(world, config.board)
-    world.append(arm_body(_perturbed(arm.facts, config.plant), _loaded(arm.tool, config.plant)))
+    world.append(arm_body(perturbed(arm.facts, config.plant), loaded(arm.tool, config.plant)))
     _camera(world, config)
     for index, obstacle in enumerate(config.obstacles):
         _obstacle(world, index, obstacle)
@@ -56,7 +62,8 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def _perturbed(facts: ArmFacts, plant: PlantConfig) -> ArmFacts:
+def perturbed(facts: ArmFacts, plant: PlantConfig) -> ArmFacts:
+    """Give the facts of an arm whose links weigh something else than the controller believes."""
     scales = per_joint(plant.inertia_scale, len(facts.links), "inertia_scale")
     links = tuple(
         replace(link, inertia=_scaled(link.inertia, float(scale)))
@@ -70,7 +77,12 @@ def _scaled(inertia: Inertia, scale: float) -> Inertia:
     return replace(inertia, mass=scale * inertia.mass, tensor=tensor)  # type: ignore[arg-type]
 
 
-def _loaded(tool: Tool, plant: PlantConfig) -> Tool:
+def loaded(tool: Tool, plant: PlantConfig) -> Tool:
+    """Give a tool with the payload that the controller does not know of.
+
+    Raises:
+        InvalidInputError: the payload takes more than the tool weighs.
+    """
     if plant.payload_kg == 0.0:
         return tool
     if plant.payload_kg < 0:
@@ -93,10 +105,10 @@ def _visual(root: ET.Element) -> None:
 
 def _board(world: ET.Element, board: BoardConfig) -> None:
     x, y, z = board.centre
-    thickness = 0.005
+    thickness = BOARD_HALF_THICKNESS
     ET.SubElement(
-        world, "geom", name="table", type="box", pos=numbers((x, 0.0, z - 0.035)), size=numbers((0.6, 0.9, 0.025)),
-        contype="1", conaffinity="2", solref=_STIFF, rgba="0.72 0.66 0.58 1",
+        world, "geom", name="table", type="box", pos=numbers((x, 0.0, z - (2 * thickness + TABLE_HALF_SIZE[2]))),
+        size=numbers(TABLE_HALF_SIZE), contype="1", conaffinity="2", solref=_STIFF, rgba="0.72 0.66 0.58 1",
     )  # fmt: skip
     ET.SubElement(
         world, "geom", name="board", type="box", pos=numbers((x, y, z - thickness)),

@@ -27,19 +27,31 @@ def run_ticks(plant, controller, cells, noise, ticks, report, trace):
         report: `report_dtype` record; overwritten.
         trace: array of `trace_dtype` records, one a tick, or an empty one.
     """
-    report.tool_force_mean, report.tool_force_peak, report.contact_ticks = 0.0, 0.0, 0
-    report.obstacle_force_peak, report.arm_touched, report.erased = 0.0, 0, 0
-    report.ticks = ticks
+    begin_report(report, ticks)
     for k in range(ticks):
         sense(plant, controller, noise[k])
         control_tick(controller)
         act(plant, controller, noise[k])
         mj_step(plant.model, plant.data)
-        _measure(plant, cells, report)
-        if trace.shape[0] > 0:
-            _record(plant, controller, trace[k])
-        plant.tick += 1
+        end_tick(plant, controller, cells, report, trace, k)
     report.tool_force_mean /= ticks
+
+
+@compiled
+def begin_report(report, ticks):
+    """Begin to report on so many ticks."""
+    report.tool_force_mean, report.tool_force_peak, report.contact_ticks = 0.0, 0.0, 0
+    report.obstacle_force_peak, report.arm_touched, report.erased = 0.0, 0, 0
+    report.ticks = ticks
+
+
+@compiled
+def end_tick(plant, controller, cells, report, trace, k):
+    """Measure what the k-th tick brought, erase, and write it down; the plant holds what physics made of it."""
+    _measure(plant, cells, report)
+    if trace.shape[0] > 0:
+        _record(plant, controller, trace[k])
+    plant.tick += 1
 
 
 @compiled

@@ -222,12 +222,7 @@ class Worlds:
         Raises:
             InvalidInputError: too many ticks, none, or a trace too short for them.
         """
-        ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
-        most = int(ticks.max())
-        if ticks.min() < 1 or most > MAX_TICKS:
-            raise InvalidInputError(f"ticks = {ticks.min() if ticks.min() < 1 else most}; give 1 to {MAX_TICKS}")
-        if trace is not None and (trace.ndim != 2 or trace.shape[0] != self.n or trace.shape[1] < most):
-            raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
+        ticks = self._checked(ticks, trace)
         noise = self.draw_noise()
         traces = self.no_trace if trace is None else trace
         self.in_threads(
@@ -235,6 +230,16 @@ class Worlds:
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces
             )
         )
+
+    def _checked(self, ticks, trace: np.ndarray | None) -> np.ndarray:
+        """Give the ticks of each world, (n,), once they and the trace are sound."""
+        ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
+        most = int(ticks.max())
+        if ticks.min() < 1 or most > MAX_TICKS:
+            raise InvalidInputError(f"ticks = {ticks.min() if ticks.min() < 1 else most}; give 1 to {MAX_TICKS}")
+        if trace is not None and (trace.ndim != 2 or trace.shape[0] != self.n or trace.shape[1] < most):
+            raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
+        return ticks
 
     def render(self) -> np.ndarray:
         """Draw every camera's mask, uint8, (n, size, size)."""

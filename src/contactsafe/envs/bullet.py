@@ -1,0 +1,49 @@
+"""The wiping task in the second engine: the same task, controller, sensors and camera, physics by PyBullet."""
+
+import numpy as np
+
+from contactsafe.compiled import compiled
+from contactsafe.envs.action import apply_action
+from contactsafe.envs.step import judge
+from contactsafe.envs.tasks import WipingTasks
+from contactsafe.envs.wiping import WipingEnv, WipingVectorEnv
+from contactsafe.sim.bullet_worlds import BulletWorlds
+
+
+class BulletTasks(WipingTasks):
+    """`WipingTasks` in PyBullet; needs `contactsafe[pybullet]` and takes no obstacles."""
+
+    world_type = BulletWorlds
+
+    def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
+        worlds = self.worlds
+        _apply(worlds.controllers, self._limits, self.arm.q_min, self.arm.q_max, self._actions)
+        worlds.run(ticks, traces if traces.shape[1] else None)
+        _judge(
+            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.camera, self._rewards[0],
+            self.tasks, worlds.masks,
+        )  # fmt: skip
+
+
+@compiled(nogil=True)
+def _apply(controllers, limits, q_min, q_max, actions):
+    for i in range(actions.shape[0]):
+        apply_action(controllers[i], limits, q_min, q_max, actions[i])
+
+
+@compiled(nogil=True)
+def _judge(plants, controllers, cells, reports, camera, rewards, tasks, masks):
+    for i in range(tasks.shape[0]):
+        judge(plants[i], controllers[i], cells[i], reports[i], camera, rewards, tasks[i], masks[i])
+
+
+class WipingBulletEnv(WipingEnv):
+    """`WipingEnv` with physics by PyBullet: `contactsafe/WipingBullet-v0`."""
+
+    task_type = BulletTasks
+
+
+class WipingBulletVectorEnv(WipingVectorEnv):
+    """`WipingVectorEnv` with physics by PyBullet, its boards stepped one after the other."""
+
+    task_type = BulletTasks

@@ -1,0 +1,168 @@
+"""The second engine: PyBullet's arm is the nominal one, its board pushes back as hard as it is pushed."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from tests.sim.scenes import BOARD_Z, CALM, aim, panda, posture, run, worlds_at
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.sim.bullet import BulletPlant, import_pybullet
+from contactsafe.sim.bullet_worlds import BulletWorlds
+from contactsafe.sim.config import BoardConfig, PlantConfig, WorldConfig, bottle
+from contactsafe.sim.world import TICK_S, Worlds
+
+pytest.importorskip("pybullet")
+
+FAR_BELOW = replace(CALM, board=BoardConfig(centre=(0.5, 0.0, -2.0)))
+"""No posture of the arm meets the table."""
+
+
+def postures(n, seed=0):
+    arm = panda()
+    share = np.random.default_rng(seed).uniform(0.1, 0.9, (n, arm.n))
+    return arm.q_min + share * (arm.q_max - arm.q_min)
+
+
+def test_gravity_torque_keeps_the_arm_where_it_is():
+    plant = BulletPlant(panda(), FAR_BELOW, TICK_S)
+    for q in postures(20):
+        plant.reset(q)
+        plant.step(panda().dynamics(q, np.zeros(7))["g"])
+        assert_allclose(plant.qd / TICK_S, 0.0, atol=1e-3)  # rad/s²; without that torque up to 200
+
+
+def test_torque_accelerates_the_arm_as_the_nominal_inertia_says():
+    """Rotors included: without them joint 7 would start twenty times as fast."""
+    plant, rng = BulletPlant(panda(), FAR_BELOW, TICK_S), np.random.default_rng(1)
+    for q in postures(20):
+        dynamics, tau = panda().dynamics(q, np.zeros(7)), rng.uniform(-1, 1, 7)
+        plant.reset(q)
+        plant.step(dynamics["g"] + tau)
+        wanted = dynamics["M_inv"] @ tau
+        assert_allclose(plant.qd / TICK_S, wanted, atol=0.01 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("error", [PlantConfig(inertia_scale=1.2), PlantConfig(payload_kg=0.5)])
+def test_an_arm_heavier_than_believed_sinks(error):
+    q = panda().home
+    plant = BulletPlant(panda(), replace(FAR_BELOW, plant=error), TICK_S)
+    plant.reset(q)
+    plant.step(panda().dynamics(q, np.zeros(7))["g"])
+    assert plant.qd[1] / TICK_S > 0.5
+
+
+@pytest.mark.parametrize("config", [CALM, WorldConfig()], ids=["calm", "noisy"])
+def test_the_controller_holds_a_pose_and_feels_nothing(config):
+    worlds = worlds_at((0.5, 0.0, 0.06), config, engine=BulletWorlds)
+    trace = run(worlds, 1000)[0]
+    assert np.abs(trace["error"][:, :3]).max() < 2e-4
+    bias = worlds.plants[0]["wrench_bias"]
+    assert_allclose(trace["wrench_ee"].mean(axis=0)[2], -bias[2], atol=0.02)  # the tool points down
+    assert trace["wrench_ee"].std(axis=0)[:3].max() < 0.12
+    assert not trace["tau_arm"].any()
+
+
+def test_free_motion_is_the_same_in_both_engines():
+    paths = []
+    for engine in (Worlds, BulletWorlds):
+        worlds = worlds_at((0.5, -0.1, 0.06), WorldConfig(), engine=engine)
+        aim(worlds, (0.45, 0.15, 0.1))
+        paths.append(run(worlds, 1000)[0])
+    assert np.linalg.norm(paths[0]["position"][-1] - paths[0]["position"][0]) > 0.2
+    assert_allclose(paths[1]["position"], paths[0]["position"], atol=5e-4)
+    assert_allclose(paths[1]["q"], paths[0]["q"], atol=3e-3)
+
+
+def test_the_board_pushes_back_as_hard_as_the_arm_presses():
+    """At rest the motors' torque, gravity and the board's push through the tool's Jacobian are in balance."""
+    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.001), engine=BulletWorlds)
+    forces = []
+    for depth in (0.002, 0.005, 0.01):
+        aim(worlds, (0.5, 0.0, BOARD_Z - depth))
+        row = run(worlds, 1200)[0][-1]
+        dynamics = panda().dynamics(row["q"], np.zeros(7))
+        assert_allclose(row["torque"] - dynamics["g"] + dynamics["J"].T @ row["wrench_ee"], 0.0, atol=0.01)
+        assert_allclose(row["tool_force"], row["wrench_ee"][:3], atol=1e-6)
+        assert_allclose(row["residual"], 0.0, atol=0.01)
+        assert_allclose(row["tau_arm"], 0.0, atol=1e-6)
+        forces.append(row["tool_force"][2])
+    assert 2.0 < forces[0] < forces[1] < forces[2] < 25.0
+
+
+def test_the_pad_is_as_stiff_as_in_mujoco():
+    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.001), engine=BulletWorlds)
+    aim(worlds, (0.5, 0.0, BOARD_Z - 0.01))
+    row = run(worlds, 1200)[0][-1]
+    assert_allclose(row["tool_force"][2] / (BOARD_Z - row["position"][2]), 4 * 4800.0, rtol=0.05)
+
+
+def test_friction_is_the_boards_share_of_the_press_and_against_the_motion():
+    worlds = worlds_at((0.5, -0.05, BOARD_Z + 0.001), engine=BulletWorlds)
+    aim(worlds, (0.5, -0.05, BOARD_Z - 0.006))
+    run(worlds, 800)
+    aim(worlds, (0.5, 0.1, BOARD_Z - 0.006))
+    trace = run(worlds, 500)[0][150:350]
+    moving = np.diff(trace["position"][:, 1]) > 2e-5
+    assert moving.mean() > 0.9
+    across, press = trace["tool_force"][1:, :2][moving], trace["tool_force"][1:, 2][moving]
+    assert_allclose(np.linalg.norm(across, axis=1), 0.3 * press, rtol=0.05)
+    assert (across[:, 1] < 0).all()
+
+
+def test_ink_goes_where_the_pad_is_pressed_only():
+    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.002), engine=BulletWorlds)
+    worlds.boards[0].draw(np.ones((1, 1)))
+    run(worlds, 51)
+    assert worlds.ink_cells()[0] == 150 * 150
+    aim(worlds, (0.5, 0.0, BOARD_Z - 0.004))
+    run(worlds, 600)
+    assert_allclose(150 * 150 - worlds.ink_cells()[0], 45 * 35, rtol=0.15)
+
+
+def test_any_part_but_the_pad_on_the_table_is_told():
+    worlds = worlds_at((0.5, 0.0, 0.1), engine=BulletWorlds)
+    worlds.reset(0, np.array([0.0, 1.55, 0.0, -0.6, 0.0, 2.6, 0.8]))  # on its elbow
+    worlds.controllers[0]["target"]["position"][2] -= 0.2
+    run(worlds, 17)
+    assert worlds.reports[0]["arm_touched"] == 0
+    run(worlds, 1000)
+    assert worlds.reports[0]["arm_touched"] == 1
+
+
+def test_a_push_on_a_link_is_felt_by_the_observer():
+    worlds = worlds_at((0.5, 0.0, 0.15), engine=BulletWorlds)
+    worlds.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 8.0, 0.0), 0.0, 1.0)
+    trace = run(worlds, 100)[0]
+    assert np.abs(trace["tau_arm"][-1]).max() > 2.0
+    assert_allclose(trace["residual_trigger"][-1], trace["tau_arm"][-1], atol=0.25 * np.abs(trace["tau_arm"][-1]).max())
+
+
+def test_after_a_reset_everything_is_as_new():
+    worlds = worlds_at((0.5, 0.0, BOARD_Z), WorldConfig(), engine=BulletWorlds)
+    traces = []
+    for _ in range(2):
+        worlds.seed(3)
+        worlds.reset(0, posture((0.5, 0.0, BOARD_Z + 0.002)))
+        aim(worlds, (0.55, 0.05, BOARD_Z - 0.005))
+        traces.append(run(worlds, 170))
+    assert_array_equal(traces[0], traces[1])
+    assert traces[0]["tool_force"].any()
+
+
+def test_obstacles_are_refused():
+    config = replace(CALM, obstacles=(bottle((0.4, 0.0, 0.3)),))
+    with pytest.raises(InvalidInputError) as caught:
+        BulletPlant(panda(), config, TICK_S)
+    assert str(caught.value) == "1 obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
+
+
+def test_without_pybullet_the_remedy_is_told(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    with pytest.raises(InvalidInputError) as caught:
+        import_pybullet()
+    assert str(caught.value) == (
+        "the second engine needs pybullet, which is not installed; run: pip install 'contactsafe[pybullet]'"
+    )
