@@ -53,7 +53,7 @@ $(TEST_VENV)/.ready: $(PINS) tools/system-packages.sh | require-python
 	@tools/system-packages.sh
 	@echo "Setting up $(TEST_VENV) (with PyTorch and the test tools; some minutes) ..."
 	@$(PYTHON) -m venv $(TEST_VENV) || { echo "$(PYTHON) cannot make virtual environments; on Debian or Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@$(TEST_BIN)/python -m pip install $(PIP_FLAGS) -c constraints.txt -e ".[train,test,docs]"
+	@$(TEST_BIN)/python -m pip install $(PIP_FLAGS) -c constraints.txt -e ".[train,handwriting,camera,test,docs]"
 	@touch $@
 
 require-python:

@@ -1,11 +1,14 @@
 """What the wiping task can be told: one frozen dataclass, every field with its unit."""
 
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.drawings import Boards, check_boards
 
 Six = tuple[float, float, float, float, float, float]
+Sight = Literal["mask", "photograph"]
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,10 @@ class WipingConfig:
         clean_share: share of the ink below which the board counts as clean.
         start_reach: the tool starts within this of the board's centre along x and y, m.
         start_height: range of the tool's height above the board at the start, m.
+        boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
+            first need `contactsafe[handwriting]`.
+        sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
+            that changes with every episode; the latter needs `contactsafe[camera]`.
         world: plant, sensors, board, camera, obstacles.
         action: scaling and limits.
         reward: weights.
@@ -99,6 +106,14 @@ class WipingConfig:
     clean_share: float = 0.002
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
+    boards: Boards = "strokes"
+    sight: Sight = "mask"
     world: WorldConfig = field(default_factory=WorldConfig)
     action: ActionConfig = field(default_factory=ActionConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
+
+    def __post_init__(self):
+        """Refuse a kind of board or of sight that there is not."""
+        check_boards(self.boards)
+        if self.sight not in get_args(Sight):
+            raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")

@@ -7,6 +7,7 @@ from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.camera import render_mask
+from contactsafe.sim.drawings import draw_board
 from contactsafe.sim.whiteboard import INK, erase_under_pad
 
 _RAISED = 0.35  # m above the board: the arm is out of the camera's view of it
@@ -60,7 +61,7 @@ class MaskSampler:
         board = self._tasks.worlds.boards[0]
         while True:
             board.clear()
-            board.draw_random(rng)
+            draw_board(board, self._tasks.config.boards, rng)
             self._wipe(rng, left=rng.uniform())
             if board.ink_cells > 0 or rng.uniform() < _SHARE_BLANK:
                 return

@@ -29,6 +29,7 @@ task_dtype = np.dtype(
         ("arm_touched", _i),
         ("force_mean", _f),  # of the step, N
         ("force_peak", _f),  # of the step, N
+        ("light", _i),  # seed of the episode's photographs; 0 where none are taken
     ]
 )
 """What the task knows of one world."""

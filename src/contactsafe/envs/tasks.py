@@ -15,9 +15,19 @@ from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.snapshot import Part, of_object, of_records, put, take
+from contactsafe.sim.drawings import draw_board
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 
 ACTION_SIZE = 18
+
+
+def _sight(config: WipingConfig, worlds: Worlds):
+    """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
+    if config.sight == "mask":
+        return None
+    from contactsafe.envs.sight import PhotographSight
+
+    return PhotographSight(worlds)
 
 
 class WipingTasks:
@@ -50,6 +60,7 @@ class WipingTasks:
         controller = presets.by_name(self.config.controller)
         self.worlds = self.world_type(self.arm, worlds or self.config.world, controller, n, seed)
         self.tasks = np.zeros(n, dtype=task_dtype)
+        self._sight = _sight(self.config, self.worlds)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.config.world.board)
         self._rewards = np.zeros(1, dtype=rewards_dtype)
@@ -74,7 +85,7 @@ class WipingTasks:
         board = worlds.boards[i]
         board.clear()
         if drawing is None:
-            board.draw_random(rng)
+            draw_board(board, config.boards, rng)
         else:
             board.draw(drawing)
         if start is None:
@@ -94,12 +105,15 @@ class WipingTasks:
         ink, distance = nearest_ink(worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"])
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
+        task["light"] = 0 if self._sight is None else rng.integers(2**31)
         self.observe(i)
 
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
         worlds = self.worlds
         observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i])
+        if self._sight is not None:
+            self._sight.look(i, i + 1, self.tasks)
 
     def parts(self) -> dict[str, Part]:
         """List what decides the tasks' future."""
@@ -136,6 +150,9 @@ class WipingTasks:
         self._actions[:] = actions
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
         self._advance(ticks, worlds.no_trace if traces is None else traces)
+        sight = self._sight
+        if sight is not None:
+            worlds.in_threads(lambda start, stop: sight.look(start, stop, self.tasks))
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         """Run one policy step of so many ticks, (n,), under `self._actions`."""

@@ -1,0 +1,38 @@
+"""The policies' masks by way of photographs: taken of every world, and segmented as a real camera's are."""
+
+import numpy as np
+
+from contactsafe.sim.photograph import PHOTO_PX, Photographer
+from contactsafe.sim.world import Worlds
+from contactsafe.vision.segment import Segmenter
+
+
+class PhotographSight:
+    """Cameras over the boards of some worlds, and what finds the ink in their pictures.
+
+    It keeps no state: light, pen and camera of an episode follow from `light` of its `task_dtype` record, the noise of
+    a picture from that and `steps`.
+
+    Args:
+        worlds: whose boards are seen.
+    """
+
+    def __init__(self, worlds: Worlds):
+        config = worlds.config
+        self._worlds = worlds
+        self._photographers = [Photographer(config.camera, config.board, model) for model in worlds.models]
+        first = self._photographers[0]
+        self._segmenter = Segmenter(first.homography, first.corners, PHOTO_PX, config.camera.size)
+
+    def photograph(self, i: int, task: np.void) -> np.ndarray:
+        """Take the photograph of world i, uint8 (455, 455, 3); `task` is its record."""
+        photographer = self._photographers[i]
+        solids = photographer.solids(self._worlds.datas[i])
+        return photographer.take(self._worlds.cells[i], solids, int(task["light"]), int(task["steps"]))
+
+    def look(self, start: int, stop: int, tasks: np.ndarray) -> None:
+        """Put what is seen in the photographs of worlds start to stop in place of their masks."""
+        for i in range(start, stop):
+            photographer = self._photographers[i]
+            hidden = photographer.hidden(photographer.solids(self._worlds.datas[i]))
+            self._worlds.masks[i] = self._segmenter.segment(self.photograph(i, tasks[i]), hidden)

@@ -1,0 +1,168 @@
+"""Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together."""
+
+import cv2
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.vision.silhouette import fill
+
+INK_PIXEL, OTHER_PIXEL = 0, 255
+
+_COARSE = 4  # photograph's pixels along an edge of one of the background's
+_WINDOW = 9  # of the background's pixels: strokes and blobs must be narrower, shadows wider
+_DEEPEST = 0.35  # share of the board's brightness that is left in the darkest shadow
+
+
+class Segmenter:
+    """Masks from the photographs of one camera that stands still, calibrated to the board.
+
+    The board's own brightness is estimated by closing over more than a stroke's width; ink is what stays darker than
+    that in some colour, by more than the picture's noise explains, and has a sharp edge, as no shadow has. No network,
+    nothing learned.
+
+    Args:
+        homography: board plane (x, y, 1), m, to pixels of the photograph (u, v, w), (3, 3).
+        corners: of the board, x and y in turn around it, (4, 2), m.
+        photo_size: pixels along an edge of the photograph.
+        mask_size: pixels along an edge of the mask.
+        faint: a pixel this share darker than the board is ink if it hangs together with ink.
+        clear: a pixel this share darker than the board is ink where its surroundings are sharp.
+        sharp: change of brightness from one pixel to those around it, share of the board's.
+        least_px: of the photograph's pixels, the fewest that make a speck.
+        share: of a mask's pixel, covered by ink, that marks it.
+        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
+
+    Raises:
+        InvalidInputError: a size below 8 pixels, a homography that is not finite, a board out of sight.
+    """
+
+    def __init__(
+        self,
+        homography: np.ndarray,
+        corners: np.ndarray,
+        photo_size: int = 455,
+        mask_size: int = 128,
+        faint: float = 0.15,
+        clear: float = 0.28,
+        sharp: float = 0.12,
+        least_px: int = 4,
+        share: float = 0.15,
+        rim_px: int = 3,
+    ):
+        homography, corners = np.asarray(homography, dtype=float), np.asarray(corners, dtype=float)
+        if homography.shape != (3, 3) or not np.isfinite(homography).all() or corners.shape != (4, 2):
+            raise InvalidInputError(
+                f"homography has shape {homography.shape} and corners {corners.shape}; give finite (3, 3) and (4, 2)"
+            )
+        if min(photo_size, mask_size) < 8:
+            raise InvalidInputError(f"photo_size = {photo_size}, mask_size = {mask_size}; give 8 or more pixels")
+        self.photo_size, self.mask_size = photo_size, mask_size
+        self.faint, self.clear, self.sharp, self.least_px, self.share = faint, clear, sharp, least_px, share
+        seen = np.column_stack([corners, np.ones(4)]) @ homography.T
+        board = np.zeros((photo_size, photo_size), np.uint8)
+        fill(board, seen[:, :2] / seen[:, 2:], 255)
+        self._rim = np.ones((2 * rim_px + 1,) * 2, np.uint8)
+        self._board = cv2.erode(board, self._rim, borderType=cv2.BORDER_REPLICATE)
+        left, top, width, height = cv2.boundingRect(self._board)
+        if width == 0:
+            raise InvalidInputError("the homography shows no board in the photograph; calibrate the camera anew")
+        # Whole blocks of the background, which resizing takes faster.
+        self._window = tuple(
+            slice(start, start + max(length // _COARSE, 1) * _COARSE)
+            for start, length in ((top, height), (left, width))
+        )
+
+    def segment(self, photo: np.ndarray, hidden: np.ndarray | None = None) -> np.ndarray:
+        """Find the ink.
+
+        Args:
+            photo: uint8, (photo_size, photo_size, 3) or (photo_size, photo_size).
+            hidden: not 0 where the arm stands before the board (`silhouette`), uint8, of the photograph's size.
+
+        Returns:
+            Mask, uint8 (mask_size, mask_size): 0 where ink is, everything else 255.
+
+        Raises:
+            InvalidInputError: a photograph of another shape or type.
+        """
+        n = self.photo_size
+        photo = np.asarray(photo)
+        if photo.dtype != np.uint8 or photo.shape not in ((n, n), (n, n, 3)):
+            raise InvalidInputError(f"photo is {photo.dtype} of shape {photo.shape}; give uint8 ({n}, {n}, 3)")
+        seen = self._board[self._window]
+        if hidden is not None:
+            if hidden.dtype != np.uint8 or hidden.shape != (n, n):
+                raise InvalidInputError(f"hidden is {hidden.dtype} of shape {hidden.shape}; give uint8 ({n}, {n})")
+            seen = cv2.bitwise_and(seen, cv2.bitwise_not(cv2.dilate(hidden[self._window], self._rim)))
+        ink = np.zeros((n, n), np.uint8)
+        if seen.any():
+            darkest = _darkest(photo[self._window], seen)
+            evened = cv2.divide(darkest, _background(darkest, seen), scale=_BRIGHT)
+            ink[self._window] = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
+        covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
+        return np.where(covered > 255 * self.share, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
+
+    def _ink(self, evened: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """255 where ink is: specks that hold a clear and sharp pixel, with the faint ones around it, uint8."""
+        middle, noise = _middle_and_spread(evened, seen)
+        faint = middle - max(_BRIGHT * self.faint, 4 * noise)
+        clear = middle - max(_BRIGHT * self.clear, 6 * noise)
+        around = np.ones((3, 3), np.uint8)
+        sharp = cv2.subtract(cv2.dilate(evened, around), cv2.erode(evened, around)) > _BRIGHT * self.sharp
+        candidates = cv2.bitwise_and((evened < faint).view(np.uint8), seen)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
+        places = np.flatnonzero(candidates)
+        names = labels.ravel()[places]
+        kept = np.zeros(count, np.uint8)
+        kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
+        kept[stats[:, cv2.CC_STAT_AREA] < self.least_px] = 0
+        ink = np.zeros_like(evened)
+        ink.ravel()[places] = kept[names]
+        return ink
+
+
+_BRIGHT = 200.0  # what the board's own brightness is evened to: noise above it must not be cut off
+
+
+def _darkest(photo: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """The darkest colour of each pixel, with the board taken for white, uint8."""
+    if photo.ndim == 2:
+        return photo
+    channels = [np.ascontiguousarray(channel) for channel in cv2.split(photo)]
+    whites = [max(1, _level(channel, seen, 0.9)) for channel in channels]
+    levels = np.arange(256) / np.array(whites)[:, None]
+    tables = np.clip(max(whites) * levels, 0, 255).astype(np.uint8)
+    balanced = [cv2.LUT(channel, table) for channel, table in zip(channels, tables, strict=True)]
+    return cv2.min(cv2.min(balanced[0], balanced[1]), balanced[2])
+
+
+def _background(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """What the picture would be without ink, uint8: dark things narrower than the window closed."""
+    size = [max(1, edge // _COARSE) for edge in picture.shape[::-1]]
+    coarse = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    whole = cv2.resize(seen, size, interpolation=cv2.INTER_AREA) == 255
+    # Where something covers more than the window, the board's general brightness bounds the guess.
+    coarse = np.maximum(coarse, int(_DEEPEST * _level(picture, seen, 0.9)))
+    coarse[~whole] = 0
+    window = np.ones((_WINDOW, _WINDOW), np.uint8)
+    high = cv2.dilate(coarse, window)
+    inside = high.copy()
+    inside[~whole] = 255
+    closed = cv2.min(cv2.erode(inside, window), high)
+    smooth = np.maximum(cv2.GaussianBlur(closed, (5, 5), 0), 1)
+    return cv2.resize(smooth, picture.shape[::-1], interpolation=cv2.INTER_LINEAR)
+
+
+def _level(picture: np.ndarray, seen: np.ndarray, share: float) -> int:
+    """Grey level below which this share of what is seen lies."""
+    counts = np.cumsum(cv2.calcHist([picture], [0], seen, [256], [0, 256]).ravel())
+    return int(np.searchsorted(counts, share * counts[-1]))
+
+
+def _middle_and_spread(picture: np.ndarray, seen: np.ndarray) -> tuple[float, float]:
+    """Median of what is seen, and the noise about it: 1.48 times the median distance, at least half a level."""
+    counts = cv2.calcHist([picture], [0], seen, [256], [0, 256]).ravel()
+    total = counts.sum()
+    middle = int(np.searchsorted(np.cumsum(counts), 0.5 * total))
+    away = np.bincount(np.abs(np.arange(256) - middle), weights=counts)
+    return float(middle), 1.48 * max(0.5, float(np.searchsorted(np.cumsum(away), 0.5 * total)))

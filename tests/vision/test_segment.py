@@ -1,0 +1,159 @@
+"""Ink found in pictures made by hand: by its darkness and sharp edge, whatever the light; nothing else."""
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.vision.segment import Segmenter
+
+N = 455
+H = np.array([[1000.0, 0, 50], [0, 1000.0, 40], [0, 0, 1]])
+CORNERS = np.array([[0, 0], [0.35, 0], [0.35, 0.37], [0, 0.37]])
+"""A board from pixel 50 to 400 and from 40 to 410, of 1 mm pixels."""
+
+
+@pytest.fixture(scope="module")
+def segmenter():
+    return Segmenter(H, CORNERS)
+
+
+def board(level=200.0, noise=2.0, seed=0):
+    """A grey picture of a board on a darker table, float."""
+    picture = np.full((N, N), 0.5 * level)
+    picture[40:410, 50:400] = level
+    return picture + np.random.default_rng(seed).normal(0.0, noise, (N, N))
+
+
+def photo(picture, tint=(1.0, 1.0, 1.0)):
+    return np.clip(picture[..., None] * tint, 0, 255).astype(np.uint8)
+
+
+def written(picture, darkness=0.8, thickness=7):
+    """The picture with a line of a pen drawn on it, and where."""
+    where = np.zeros((N, N), np.uint8)
+    cv2.polylines(where, [np.array([[100, 100], [180, 220], [260, 120], [340, 330]])], False, 255, thickness)
+    return picture * (1 - darkness * where / 255), where
+
+
+def expected(where):
+    return cv2.resize(where, (128, 128), interpolation=cv2.INTER_AREA) > 255 * 0.15
+
+
+def agreement(mask, where):
+    found, there = mask == 0, expected(where)
+    return (found & there).sum() / (found | there).sum()
+
+
+@pytest.mark.parametrize("level", [60.0, 120.0, 230.0])
+@pytest.mark.parametrize("noise", [0.0, 2.0, 5.0])
+def test_a_clean_board_is_blank(segmenter, level, noise):
+    assert (segmenter.segment(photo(board(level, noise))) == 255).all()
+
+
+@pytest.mark.parametrize("darkness", [0.35, 0.6, 0.9])
+def test_a_line_is_found_in_its_place(segmenter, darkness):
+    picture, where = written(board(), darkness)
+    mask = segmenter.segment(photo(picture))
+    assert mask.dtype == np.uint8
+    assert set(np.unique(mask)) == {0, 255}
+    assert agreement(mask, where) > 0.85
+
+
+def test_brightness_and_tint_of_the_light_change_next_to_nothing(segmenter):
+    picture, where = written(board(noise=0.0))
+    for scale, tint in ((0.4, (1, 1, 1)), (1.0, (1.0, 0.85, 0.7)), (0.7, (0.8, 0.9, 1.0))):
+        assert agreement(segmenter.segment(photo(scale * picture, tint)), where) > 0.85
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_ink_of_any_colour_is_ink(segmenter, channel):
+    """A pen that takes light from one channel alone."""
+    clean = board()
+    picture, where = written(clean)
+    planes = [picture if k == channel else clean for k in range(3)]
+    assert agreement(segmenter.segment(np.clip(np.stack(planes, -1), 0, 255).astype(np.uint8)), where) > 0.85
+
+
+def test_a_grey_picture_does_as_well(segmenter):
+    picture, where = written(board())
+    assert agreement(segmenter.segment(photo(picture)[..., 0]), where) > 0.85
+
+
+def test_a_slope_of_light_and_a_soft_shadow_are_not_ink(segmenter):
+    light = np.linspace(1.0, 0.5, N)[None] * np.ones((N, 1))
+    shadow = np.ones((N, N))
+    cv2.circle(shadow, (230, 200), 60, 0.55, -1)
+    light *= cv2.GaussianBlur(shadow, (0, 0), 4.0)
+    assert (segmenter.segment(photo(board() * light)) == 255).all()
+    picture, where = written(board())
+    assert agreement(segmenter.segment(photo(picture * light)), where) > 0.8
+
+
+def test_what_covers_more_than_the_window_is_ink_too(segmenter):
+    picture, where = board(), np.zeros((N, N), np.uint8)
+    where[100:250, 120:300] = 255
+    assert agreement(segmenter.segment(photo(np.where(where > 0, 25.0, picture))), where) > 0.95
+
+
+def test_nothing_is_looked_for_where_the_arm_stands_and_off_the_board(segmenter):
+    picture, where = written(board())
+    hidden = np.zeros((N, N), np.uint8)
+    hidden[90:200, 60:390] = 255
+    picture[hidden > 0] = np.random.default_rng(1).uniform(0, 255, (hidden > 0).sum())  # anything at all
+    picture[5:30, 5:30], picture[430:450, 60:70] = 0.0, 0.0
+    mask = segmenter.segment(photo(picture), hidden)
+    where[hidden > 0] = 0
+    found = mask == 0
+    assert not (found & (cv2.resize(hidden, (128, 128), interpolation=cv2.INTER_AREA) == 255)).any()
+    assert agreement(mask, where) > 0.8
+    assert not (found & ~cv2.dilate(expected(where).astype(np.uint8), np.ones((3, 3))).astype(bool)).any()
+
+
+def test_with_all_hidden_nothing_is_found(segmenter):
+    assert (segmenter.segment(photo(written(board())[0]), np.full((N, N), 255, np.uint8)) == 255).all()
+
+
+def test_a_picture_is_left_as_it_was(segmenter):
+    picture, hidden = photo(written(board())[0]), np.zeros((N, N), np.uint8)
+    before = picture.copy()
+    segmenter.segment(picture, hidden)
+    assert_array_equal(picture, before)
+    assert not hidden.any()
+
+
+@pytest.mark.parametrize(
+    ("picture", "hidden", "text"),
+    [
+        (np.zeros((N, N, 4), np.uint8), None, "photo is uint8 of shape (455, 455, 4); give uint8 (455, 455, 3)"),
+        (np.zeros((N, N, 3)), None, "photo is float64 of shape (455, 455, 3); give uint8 (455, 455, 3)"),
+        (
+            np.zeros((N, N, 3), np.uint8),
+            np.zeros((128, 128), np.uint8),
+            "hidden is uint8 of shape (128, 128); give uint8 (455, 455)",
+        ),
+    ],
+)
+def test_other_pictures_are_refused(segmenter, picture, hidden, text):
+    with pytest.raises(InvalidInputError) as caught:
+        segmenter.segment(picture, hidden)
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize(
+    ("homography", "corners", "sizes", "text"),
+    [
+        (
+            np.full((3, 3), np.nan), CORNERS, {},
+            "homography has shape (3, 3) and corners (4, 2); give finite (3, 3) and (4, 2)",
+        ),
+        (H, CORNERS[:3], {}, "homography has shape (3, 3) and corners (3, 2); give finite (3, 3) and (4, 2)"),
+        (H, CORNERS, {"mask_size": 0}, "photo_size = 455, mask_size = 0; give 8 or more pixels"),
+        (H, CORNERS + 9.0, {}, "the homography shows no board in the photograph; calibrate the camera anew"),
+    ],
+)  # fmt: skip
+def test_cameras_that_cannot_be_are_refused(homography, corners, sizes, text):
+    with pytest.raises(InvalidInputError) as caught:
+        Segmenter(homography, corners, **sizes)
+    assert str(caught.value) == text
