@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import tyro
 from tqdm import tqdm
@@ -115,6 +115,12 @@ def evaluate(
     episodes: int = 50,
     seed: int = 0,
     controller: str = "safe",
+    boards: str = "strokes",
+    sight: str = "mask",
+    engine: str = "mujoco",
+    pushed: bool = False,
+    randomised: bool = False,
+    reference: str | None = None,
     json: bool = False,
 ) -> None:
     """Let a policy wipe boards it has never seen and report success, forces and times.
@@ -124,30 +130,51 @@ def evaluate(
         episodes: boards to wipe.
         seed: of boards, starts and noise.
         controller: preset underneath.
+        boards: strokes, digits, text or handwriting.
+        sight: the ink as it is (mask), or as segmentation finds it in photographs (photograph).
+        engine: mujoco or pybullet.
+        pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
+        randomised: every board another plant, pad, camera and light, as in training.
+        reference: a script in place of the policy: raster, nearest-ink or random.
         json: print JSON instead of a table.
     """
-    import gymnasium
-
+    from contactsafe.envs import make_engine
     from contactsafe.envs.config import WipingConfig
-    from contactsafe.envs.wiping import WipingVectorEnv
+    from contactsafe.envs.pushes import Pushes
+    from contactsafe.learning import references
     from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
     from contactsafe.learning.policy import Policy
+    from contactsafe.sim.randomisation import Randomisation
 
     presets.by_name(controller)
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
     if seed < 0:
         raise InvalidInputError(f"seed = {seed}; give 0 or more")
-    loaded = Bundle.load(bundle or shipped_bundle())
-    side_by_side = max(n for n in range(1, 17) if episodes % n == 0)
-    env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=side_by_side, config=WipingConfig(controller=controller))
-    policy = Policy(loaded, cast(WipingVectorEnv, env).camera_homography)
+    if reference is not None and bundle is not None:
+        raise InvalidInputError(f"a bundle and --reference {reference} are both given; name one")
+    loaded = None if reference else Bundle.load(bundle or shipped_bundle())
+    config = WipingConfig(
+        controller=controller,
+        boards=cast(Any, boards),
+        sight=cast(Any, sight),
+        pushes=Pushes() if pushed else None,
+        randomisation=Randomisation.broad() if randomised else None,
+    )
+    env = make_engine(engine, max(n for n in range(1, 17) if episodes % n == 0), config)
+    if loaded is None:
+        policy = references.reference(str(reference), config, env, seed)
+    else:
+        policy = Policy(loaded, env.camera_homography)
     with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
         results = evaluate_policy(policy, env, episodes, HELD_OUT_SEED + seed, on_episode=lambda record: bar.update())
     env.close()
     records = results.pop("records")
     if json:
-        print(to_json({**results, "seed": seed, "controller": controller, "boards": records}))
+        task = {"boards": boards, "sight": sight, "engine": engine, "pushed": pushed, "randomised": randomised}
+        policy_name = reference or str(bundle or "shipped")
+        asked = {"policy": policy_name, "seed": seed, "controller": controller, "task": task}
+        print(to_json({**results, **asked, "boards": records}))
         return
     for key, value in results.items():
         print(f"{key:28s} {value:.4g}" if isinstance(value, float) else f"{key:28s} {value}")
@@ -176,12 +203,12 @@ def bench(json: bool = False, bundle: Path | None = None) -> None:
 
 
 def train(arguments: Sequence[str]) -> None:
-    """Train the eyes (vae) or a policy (ppo, sac); `contactsafe train vae --help`, `contactsafe train ppo --help`."""
+    """Prepare the eyes (vae) or train a policy (ppo, sac); `contactsafe train ppo --help`."""
     if not arguments or arguments[0] in ("-h", "--help"):
         print(
             "usage: contactsafe train vae|ppo|sac [options]\n\n"
-            "  vae  the β-VAE on masks from the simulator; writes runs/vae\n"
-            "  ppo  a policy on [pose, latent]; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
+            "  vae  the eyes: foveated ones, which need no training, or a β-VAE; writes runs/vae\n"
+            "  ppo  a policy on what it feels and sees; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
             "  sac  the same with SAC, which reuses what it has seen; writes runs/sac\n\n"
             "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
             "from its last epoch or rollout, and ends with the weights that it would have had."
@@ -206,8 +233,9 @@ def _train_vae(arguments: list[str]) -> None:
     config = tyro.cli(VaeConfig, prog="contactsafe train vae", args=arguments)
     sampler = MaskSampler()
     report = train_vae(config, sampler.sample, sampler.homography)
-    print(to_json({"reconstruction": report["reconstruction"], "nearest_ink": report["nearest_ink"]}))
-    print(f"encoder: {config.out}; next: contactsafe train ppo --vae {config.out}")
+    shown = ("representation", "active_latents", "reconstruction", "nearest_ink")
+    print(to_json({name: report[name] for name in shown if name in report}))
+    print(f"eyes: {config.out}; next: contactsafe train ppo --vae {config.out}")
 
 
 def _train_policy(algorithm: str, arguments: list[str]) -> None:
@@ -216,14 +244,18 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     from contactsafe.envs.config import WipingConfig
     from contactsafe.learning.algorithms import ALGORITHMS
     from contactsafe.learning.train_policy import train_policy
+    from contactsafe.sim.randomisation import Randomisation
 
     config = tyro.cli(ALGORITHMS[algorithm], prog=f"contactsafe train {algorithm}", args=arguments)
-    free_space = WipingConfig(controller="vices")
+    task = WipingConfig(randomisation=Randomisation.broad() if config.randomise else None)
 
     def make_env(n: int):
-        return gymnasium.make_vec(config.env_id, num_envs=n, config=free_space)
+        return gymnasium.make_vec(config.env_id, num_envs=n, config=task)
 
-    print(to_json(train_policy(config, make_env)))
+    def make_held_out(n: int):
+        return gymnasium.make_vec(config.env_id, num_envs=n, config=WipingConfig())
+
+    print(to_json(train_policy(config, make_env, make_held_out)))
     print(f"policy: {config.out / 'bundle'}; next: contactsafe evaluate {config.out / 'bundle'}")
 
 

@@ -14,13 +14,14 @@ class BulletTasks(WipingTasks):
     """`WipingTasks` in PyBullet; needs `contactsafe[pybullet]` and takes no obstacles."""
 
     world_type = BulletWorlds
+    varies = False
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         worlds = self.worlds
         _apply(worlds.controllers, self._limits, self.arm.q_min, self.arm.q_max, self._actions)
         worlds.run(ticks, traces if traces.shape[1] else None)
         _judge(
-            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.camera, self._rewards[0],
+            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, self._rewards[0],
             self.tasks, worlds.masks,
         )  # fmt: skip
 
@@ -32,9 +33,9 @@ def _apply(controllers, limits, q_min, q_max, actions):
 
 
 @compiled(nogil=True)
-def _judge(plants, controllers, cells, reports, camera, rewards, tasks, masks):
+def _judge(plants, controllers, cells, reports, cameras, rewards, tasks, masks):
     for i in range(tasks.shape[0]):
-        judge(plants[i], controllers[i], cells[i], reports[i], camera, rewards, tasks[i], masks[i])
+        judge(plants[i], controllers[i], cells[i], reports[i], cameras, rewards, tasks[i], masks[i])
 
 
 class WipingBulletEnv(WipingEnv):

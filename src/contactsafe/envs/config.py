@@ -3,9 +3,11 @@
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from contactsafe.envs.pushes import Pushes
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import Boards, check_boards
+from contactsafe.sim.randomisation import Randomisation
 
 Six = tuple[float, float, float, float, float, float]
 Sight = Literal["mask", "photograph"]
@@ -36,7 +38,7 @@ class ActionConfig:
     stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
     damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
     lead: float = 0.05
-    press: float = 0.004
+    press: float = 0.012
     height: float = 0.12
     reach: float = 0.27
     tilt: float = 0.06
@@ -68,9 +70,9 @@ class RewardConfig:
     approach: float = 5.0
     contact: float = 0.005
     time: float = -0.01
-    force: float = -0.02
+    force: float = -0.04
     force_limit_n: float = 40.0
-    gentle_n: float = 10.0
+    gentle_n: float = 7.0
     arm_table: float = -5.0
 
     def __post_init__(self):
@@ -96,6 +98,8 @@ class WipingConfig:
             first need `contactsafe[handwriting]`.
         sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
             that changes with every episode; the latter needs `contactsafe[camera]`.
+        pushes: on the arm while it works; None for none.
+        randomisation: what differs from episode to episode besides the drawing; None for nothing.
         world: plant, sensors, board, camera, obstacles.
         action: scaling and limits.
         reward: weights.
@@ -108,6 +112,8 @@ class WipingConfig:
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"
     sight: Sight = "mask"
+    pushes: Pushes | None = None
+    randomisation: Randomisation | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
     action: ActionConfig = field(default_factory=ActionConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose, observed_target
-from contactsafe.sim.camera import render_mask
+from contactsafe.sim.camera import camera_at, render_mask
 from contactsafe.sim.stepping import run_ticks, tool_position
 from contactsafe.sim.whiteboard import INK, row_is_bare
 
@@ -91,29 +91,29 @@ def score(task, report, rewards, ink, distance):
 
 @compiled(nogil=True)
 def step_tasks(
-    start, stop, plants, controllers, cells, noise, ticks, reports, traces, camera, limits, q_min, q_max, actions,
+    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, limits, q_min, q_max, actions,
     rewards, tasks, masks,
 ):  # fmt: skip
     """Run one policy step of each task from start to stop; the arrays are those of `Worlds` and `WipingTasks`."""
     for i in range(start, stop):
         apply_action(controllers[i], limits, q_min, q_max, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
-        judge(plants[i], controllers[i], cells[i], reports[i], camera, rewards, tasks[i], masks[i])
+        judge(plants[i], controllers[i], cells[i], reports[i], cameras, rewards, tasks[i], masks[i])
 
 
 @compiled
-def judge(plant, controller, cells, report, camera, rewards, task, mask):
+def judge(plant, controller, cells, report, cameras, rewards, task, mask):
     """Score the step that one world has run and look at it."""
     ink, distance = nearest_ink(cells, plant.origin, plant.cell, tool_position(plant))
     score(task, report, rewards, ink, distance)
     task.steps += 1
-    observe(plant, controller, cells, camera, task, mask)
+    observe(plant, controller, cells, cameras, task, mask)
 
 
 @compiled
-def observe(plant, controller, cells, camera, task, mask):
+def observe(plant, controller, cells, cameras, task, mask):
     """Fill what the policy sees: the tool's pose, where it is told to be and how stiffly, the force, the mask."""
     observed_pose(controller, task.pose)
     observed_target(controller, task.pose, task.target)
     task.force[:] = controller.state.tool_force
-    render_mask(camera, cells, plant, mask)
+    render_mask(camera_at(cameras, plant.camera), cells, plant, mask)

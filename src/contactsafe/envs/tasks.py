@@ -8,14 +8,16 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.envs.action import DOWN, action_limits
 from contactsafe.envs.config import WipingConfig
+from contactsafe.envs.pushes import Pusher
 from contactsafe.envs.step import REWARD_TERMS, nearest_ink, observe, rewards_dtype, step_tasks, task_dtype
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.snapshot import Part, of_object, of_records, put, take
 from contactsafe.sim.drawings import draw_board
+from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
+from contactsafe.sim.variation import Variation
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 
 ACTION_SIZE = 18
@@ -48,6 +50,9 @@ class WipingTasks:
     world_type: type[Worlds] = Worlds
     """What simulates; another engine's tasks name theirs."""
 
+    varies = True
+    """Whether episodes may differ by more than what is drawn on the board."""
+
     def __init__(
         self,
         config: WipingConfig | None = None,
@@ -58,7 +63,13 @@ class WipingTasks:
         self.config = config or WipingConfig()
         self.arm = robots.panda()
         controller = presets.by_name(self.config.controller)
-        self.worlds = self.world_type(self.arm, worlds or self.config.world, controller, n, seed)
+        ranges = self.config.randomisation
+        if ranges is not None and not self.varies:
+            raise InvalidInputError("randomisation is given, and this engine knows none; leave it out, or use MuJoCo")
+        own_models = {} if ranges is None else {"shared": False}
+        self.worlds = self.world_type(self.arm, worlds or self.config.world, controller, n, seed, **own_models)
+        self._variation = None if ranges is None else Variation(self.worlds, ranges)
+        self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
         self.tasks = np.zeros(n, dtype=task_dtype)
         self._sight = _sight(self.config, self.worlds)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
@@ -93,7 +104,11 @@ class WipingTasks:
             start = np.add(
                 config.world.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
             )
+        if self._variation is not None:
+            self._variation.draw(i, rng)
         worlds.reset(i, self.posture_over(Pose(np.asarray(start, dtype=float), DOWN)))
+        if self._pusher is not None:
+            self._pusher.begin(i, rng)
         controller = worlds.controllers[i]
         target = controller["target"]
         target["K_task"] = config.action.stiffness_start
@@ -110,14 +125,19 @@ class WipingTasks:
 
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
-        worlds = self.worlds
-        observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.camera, self.tasks[i], worlds.masks[i])
+        worlds, task = self.worlds, self.tasks[i]
+        observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.cameras, task, worlds.masks[i])
         if self._sight is not None:
             self._sight.look(i, i + 1, self.tasks)
+        if self._variation is not None:
+            self._variation.look_first(i)
 
     def parts(self) -> dict[str, Part]:
         """List what decides the tasks' future."""
-        return {"worlds": of_object(self.worlds), "tasks": of_records(self.tasks)}
+        parts = {} if self._variation is None else {"variation": of_object(self._variation)}
+        if self._pusher is not None:
+            parts["pushes"] = of_generators(self._pusher.rngs)
+        return {**parts, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks)}
 
     def snapshot(self) -> dict[str, Any]:
         """Take all that decides the tasks' future, as plain values and arrays."""
@@ -148,11 +168,15 @@ class WipingTasks:
         if not np.isfinite(actions).all():
             raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
         self._actions[:] = actions
+        if self._pusher is not None:
+            self._pusher.step()
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
         self._advance(ticks, worlds.no_trace if traces is None else traces)
         sight = self._sight
         if sight is not None:
             worlds.in_threads(lambda start, stop: sight.look(start, stop, self.tasks))
+        if self._variation is not None:
+            worlds.in_threads(self._variation.look)
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         """Run one policy step of so many ticks, (n,), under `self._actions`."""
@@ -161,7 +185,7 @@ class WipingTasks:
         worlds.in_threads(
             lambda start, stop: step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
-                worlds.camera, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0], self.tasks,
+                worlds.cameras, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0], self.tasks,
                 worlds.masks,
             )
         )  # fmt: skip

@@ -69,8 +69,8 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
     records: list[list[dict]] = [[] for _ in range(n)]
     contact_forces, all_steps = [], 0
     begin = getattr(policy, "begin", lambda i: None)
-    for i in range(n):
-        begin(i)
+    for k in range(n):
+        begin(k)
     while any(len(r) < quota for r in records):
         fresh = steps % policy.action_repeat == 0
         if fresh.any():
@@ -96,8 +96,8 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
             if on_episode is not None:
                 on_episode(records[i][-1])
         steps[done], peak[done], returns[done] = 0, 0.0, 0.0
-        for i in np.flatnonzero(done):
-            begin(i)
+        for k in np.flatnonzero(done).tolist():
+            begin(k)
     return _summary([record for env_records in records for record in env_records], contact_forces, all_steps)
 
 

@@ -33,6 +33,7 @@ class PolicyConfig:
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         env_id: Gymnasium id of the task.
+        randomise: train on worlds that differ from episode to episode; held-out boards are wiped in the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
         max_minutes: stop after this long in this session, keep a checkpoint and export what there is; 0 for no limit.
@@ -59,6 +60,7 @@ class PolicyConfig:
     out: Path = Path("runs/policy")
     resume: bool = False
     env_id: str = "contactsafe/Wiping-v0"
+    randomise: bool = True
     num_envs: int = 16
     total_steps: int = 3_000_000
     max_minutes: float = 0.0

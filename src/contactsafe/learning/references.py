@@ -51,8 +51,8 @@ class _Script:
         for i in range(len(pose)):
             goal, lower = self._goal(i, observation)
             step = goal - (pose[i, :2] + target[i, :2])
-            length = np.linalg.norm(step)
-            actions[i, :2] = step * min(1.0, SPEED_M_S / 60.0 / max(length, 1e-9)) / self._step[:2]
+            most = SPEED_M_S / 60.0
+            actions[i, :2] = step * most / max(float(np.linalg.norm(step)), most) / self._step[:2]
             if lower:
                 actions[i, 2] = self._press(i, force[i]) / self._step[2]
         return np.clip(actions, -1.0, 1.0)
@@ -113,7 +113,8 @@ class NearestInk(_Script):
     def _goal(self, i, observation):
         # Beyond the ink by the way that friction keeps the tool behind.
         away = self._away[i]
-        return observation["pose"][i, :2] + away * (1.0 + ARRIVED_M / max(np.linalg.norm(away), ARRIVED_M)), True
+        beyond = ARRIVED_M / max(float(np.linalg.norm(away)), ARRIVED_M)
+        return observation["pose"][i, :2] + away * (1.0 + beyond), True
 
 
 class Chance:

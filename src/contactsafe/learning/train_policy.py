@@ -21,7 +21,7 @@ from contactsafe.learning.run import Run, load_run
 from contactsafe.learning.vec_env import EncodedVecEnv
 
 
-def train_policy(config, make_env=None):
+def train_policy(config, make_env=None, make_held_out=None):
     """Train, export a bundle, and evaluate it on held-out boards.
 
     Killed at any moment and resumed, a run ends with the same weights as one that was left alone: on one machine, with
@@ -30,6 +30,7 @@ def train_policy(config, make_env=None):
     Args:
         config: a PolicyConfig of some algorithm, such as PpoConfig.
         make_env: `make_env(num_envs)` gives the vector environment; None makes config.env_id through Gymnasium.
+        make_held_out: the same for the boards of the evaluation; None takes make_env.
 
     Returns:
         The results written into the bundle, a dict.
@@ -52,7 +53,7 @@ def train_policy(config, make_env=None):
     layers, description = config.actor(model), _describe(config, eyes, effort)
     folder = export_bundle(out / "bundle", eyes.encoder, layers, env.scaling, description, force=True)
     if config.evaluate_episodes:
-        description["results"] = _evaluate(folder, make_env, config)
+        description["results"] = _evaluate(folder, make_held_out or make_env, config)
         export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
     return description["results"]
 

@@ -5,6 +5,7 @@ in. The arm stands before the board: a marked pixel whose line of sight meets on
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -20,7 +21,7 @@ INK_PIXEL, OTHER_PIXEL = 0, 255
 
 
 def camera_axes(camera: Camera) -> np.ndarray:
-    """Give the camera's axes in the world, columns right, down, forward, (3, 3)."""
+    """Give the camera's axes in the world, columns right, down, forward, (3, 3); it stands upright."""
     forward = np.array(camera.target) - np.array(camera.position)
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -91,6 +92,21 @@ def camera_tables(camera: Camera, board: Whiteboard, model: mujoco.MjModel) -> C
         shapes=np.array([[i, int(model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX)] for i in arm], dtype=np.int64),
         sizes=model.geom_size.copy(),
     )
+
+
+def stack_cameras(tables: Sequence[CameraTables]) -> CameraTables:
+    """Put the tables of several cameras of one world side by side, along a new first axis of all but its shapes."""
+    own = [name for name in CameraTables._fields if name not in ("shapes", "sizes")]
+    return tables[0]._replace(**{name: np.stack([getattr(table, name) for table in tables]) for name in own})
+
+
+@compiled
+def camera_at(cameras, index):
+    """Give one camera's tables out of those that `stack_cameras` put side by side."""
+    return CameraTables(
+        cameras.pixels[index], cameras.rays[index], cameras.distance[index], cameras.position[index],
+        cameras.axes[index], cameras.focal_px[index], cameras.shapes, cameras.sizes,
+    )  # fmt: skip
 
 
 def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:

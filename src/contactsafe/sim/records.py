@@ -73,6 +73,7 @@ def plant_dtype(n: int) -> np.dtype:
             ("cell", _f),  # m
             ("pad_half", _f, (2,)),  # m; 0 without a pad
             ("press_n", _f),
+            ("camera", _i),  # number of the camera that looks at this world
         ]
     )
 

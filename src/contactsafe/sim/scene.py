@@ -104,14 +104,16 @@ def _visual(root: ET.Element) -> None:
 
 
 def _board(world: ET.Element, board: BoardConfig) -> None:
+    """Add board and table, one body that may be moved: its origin is the middle of the board's face."""
     x, y, z = board.centre
     thickness = BOARD_HALF_THICKNESS
+    body = ET.SubElement(world, "body", name="board", pos=numbers((x, y, z)))
     ET.SubElement(
-        world, "geom", name="table", type="box", pos=numbers((x, 0.0, z - (2 * thickness + TABLE_HALF_SIZE[2]))),
+        body, "geom", name="table", type="box", pos=numbers((0.0, -y, -(2 * thickness + TABLE_HALF_SIZE[2]))),
         size=numbers(TABLE_HALF_SIZE), contype="1", conaffinity="2", solref=_STIFF, rgba="0.72 0.66 0.58 1",
     )  # fmt: skip
     ET.SubElement(
-        world, "geom", name="board", type="box", pos=numbers((x, y, z - thickness)),
+        body, "geom", name="board", type="box", pos=numbers((0.0, 0.0, -thickness)),
         size=numbers((board.size[0] / 2, board.size[1] / 2, thickness)),
         contype="1", conaffinity="2", solref=_STIFF, rgba="0.97 0.97 0.97 1",
     )  # fmt: skip

@@ -14,7 +14,7 @@ from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype, fill_params
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.camera import camera_tables, plane_homography, render_mask
+from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.records import fill_plant, noise_channels, plant_dtype, report_dtype, trace_dtype
 from contactsafe.sim.scene import build_plant
@@ -54,8 +54,10 @@ def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list
     return configs
 
 
-def _plants(arm: Arm, configs: list[WorldConfig]) -> list[mujoco.MjModel]:
+def _plants(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.MjModel]:
     """Compile a plant for each configuration, equal ones once, but for obstacles that travel: those move the model."""
+    if not shared:
+        return [build_plant(arm, c) for c in configs]
     compiled: dict[WorldConfig, mujoco.MjModel] = {}
     return [
         build_plant(arm, c) if any(any(o.travel) for o in c.obstacles)
@@ -79,13 +81,15 @@ class Worlds:
         n: how many.
         seed: of the sensors' noise and bias; world i draws from its own stream. One for all, or one for each: then
             what a world does depends on nothing but its own.
+        shared: whether worlds alike share a model; false where each is changed from episode to episode.
 
     Attributes:
         plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `report_dtype` records, (n,).
         cells: the boards, uint8, (n, rows, columns).
         boards: `Whiteboard` objects whose cells lie in `cells`.
         masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
-        camera: `CameraTables`.
+        camera: `CameraTables` as calibrated.
+        cameras: those that look, side by side; `plants["camera"]` says which one at which world.
         homography: of board plane to mask pixels, (3, 3).
         no_trace: an empty trace, for `run_worlds` and its like.
     """
@@ -97,12 +101,13 @@ class Worlds:
         controller: ControllerConfig | None = None,
         n: int = 1,
         seed: int | Sequence[int] | None = None,
+        shared: bool = True,
     ):
         self.arm, self.n = arm, n
         self.configs = _one_each(world, n)
         _check_tick(controller)
         self.config = self.configs[0]
-        self.models = _plants(arm, self.configs)
+        self.models = _plants(arm, self.configs, shared)
         self.datas = [mujoco.MjData(model) for model in self.models]
         self.boards = [Whiteboard(self.config.board) for _ in range(n)]
         self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
@@ -117,6 +122,7 @@ class Worlds:
         size = self.config.camera.size
         self.masks = np.full((n, size, size), 255, dtype=np.uint8)
         self.camera = camera_tables(self.config.camera, self.boards[0], self.models[0])
+        self.cameras = stack_cameras([self.camera])
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))

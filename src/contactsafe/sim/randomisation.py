@@ -6,7 +6,6 @@ and into what the camera sees; controller and policy are never told.
 
 from dataclasses import dataclass, fields
 
-import mujoco
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
@@ -63,8 +62,8 @@ class Randomisation:
     def broad(cls) -> "Randomisation":
         """Give the ranges that the shipped policy is trained with."""
         return cls(
-            board_height_m=(-0.006, 0.006),
-            board_tilt_rad=(-0.015, 0.015),
+            board_height_m=(-0.005, 0.005),
+            board_tilt_rad=(-0.012, 0.012),
             friction=(0.6, 1.6),
             pad_size=(0.85, 1.1),
             camera_m=(-0.006, 0.006),
@@ -120,48 +119,9 @@ def draw(config: Randomisation, cameras: int, rng: np.random.Generator) -> np.nd
     """Draw one episode's world, a `draw_dtype` record, (); `cameras` is how many stand ready."""
     drawn = np.zeros((), dtype=draw_dtype)
     for name in draw_dtype.names or ():
-        if name == "camera":
-            drawn[name] = rng.integers(cameras)
-        elif draw_dtype[name].base.kind == "i":
-            drawn[name] = rng.integers(*getattr(config, name), endpoint=True)
-        else:
-            drawn[name] = rng.uniform(*getattr(config, name), draw_dtype[name].shape)
+        low, high = (0, cameras - 1) if name == "camera" else getattr(config, name)
+        whole = draw_dtype[name].base.kind == "i"
+        drawn[name] = (
+            rng.integers(low, high, endpoint=True) if whole else rng.uniform(low, high, draw_dtype[name].shape)
+        )
     return drawn
-
-
-class Nominal:
-    """A plant as it was built, from which every draw starts.
-
-    Args:
-        model: of the plant; its own, since draws change it.
-        friction: joint friction of the plant record, (n, 3).
-        pad_half: half edges of the pad of the plant record, (2,), m.
-    """
-
-    def __init__(self, model: mujoco.MjModel, friction: np.ndarray, pad_half: np.ndarray):
-        self._model = model
-        self._friction, self._pad_half = friction.copy(), pad_half.copy()
-        self._board, self._tool = model.body("board").id, model.body("tool").id
-        self._links = [i for i in range(model.nbody) if model.body(i).name.startswith("link")]
-        self._pad = model.geom("pad").id
-        self._kept = {name: getattr(model, name).copy() for name in _CHANGED}
-
-    def apply(self, plant, drawn) -> None:
-        """Make the model and the `plant_dtype` record those that were drawn."""
-        model = self._model
-        for name, value in self._kept.items():
-            getattr(model, name)[:] = value
-        model.body_pos[self._board, 2] += drawn["board_height_m"]
-        mujoco.mju_euler2Quat(model.body_quat[self._board], [*drawn["board_tilt_rad"], 0.0], "xyz")
-        model.geom_friction[self._pad, 0] *= drawn["friction"]
-        model.geom_size[self._pad, :2] *= drawn["pad_size"]
-        model.body_mass[self._links] *= drawn["inertia"]
-        model.body_inertia[self._links] *= drawn["inertia"]
-        model.body_mass[self._tool] += drawn["payload_kg"]
-        plant["friction"] = self._friction
-        plant["friction"][:, 0] *= drawn["joint_friction"]
-        plant["pad_half"] = self._pad_half * drawn["pad_size"]
-        plant["delay_ticks"] = drawn["torque_delay_ticks"]
-
-
-_CHANGED = ("body_pos", "body_quat", "body_mass", "body_inertia", "geom_friction", "geom_size")

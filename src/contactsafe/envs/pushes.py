@@ -1,0 +1,71 @@
+"""Somebody who leans on the arm now and then while it works: for tests of what the controller shields the task from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+from contactsafe.sim.world import TICK_S, Worlds
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """Pushes one after the other; each draws evenly from the ranges.
+
+    Attributes:
+        force_n: how hard, N, in any direction.
+        lasting_s: how long, s.
+        pause_s: between the end of one and the start of the next, s.
+        links: which ones are pushed.
+    """
+
+    force_n: Range = (5.0, 25.0)
+    lasting_s: Range = (0.3, 1.0)
+    pause_s: Range = (0.5, 2.0)
+    links: tuple[int, ...] = (3, 4, 5, 6)
+
+    def __post_init__(self):
+        """Refuse pushes that cannot be."""
+        for name in ("force_n", "lasting_s", "pause_s"):
+            low, high = getattr(self, name)
+            if not 0.0 <= low <= high < np.inf:
+                raise InvalidInputError(f"pushes {name} = ({low}, {high}); give (low, high) with 0 ≤ low ≤ high")
+        if not self.links or not set(self.links) <= set(range(1, 8)):
+            raise InvalidInputError(f"pushes links = {self.links}; give some of 1 to 7")
+
+
+class Pusher:
+    """Pushes the arms of some worlds.
+
+    Args:
+        worlds: whose arms.
+        pushes: how.
+
+    Attributes:
+        rngs: the generator of each world's episode.
+    """
+
+    def __init__(self, worlds: Worlds, pushes: Pushes):
+        self._worlds, self._pushes = worlds, pushes
+        self.rngs = [np.random.default_rng(0) for _ in range(worlds.n)]
+
+    def begin(self, i: int, rng: np.random.Generator) -> None:
+        """Begin world i's episode, after its reset."""
+        self.rngs[i] = np.random.default_rng(rng.integers(2**63))
+        self._next(i)
+
+    def step(self) -> None:
+        """Plan the next push wherever the last is over; call it before every policy step."""
+        plants = self._worlds.plants
+        for i in np.flatnonzero(plants["tick"] >= plants["push_stop"]).tolist():
+            self._next(i)
+
+    def _next(self, i: int) -> None:
+        rng, pushes = self.rngs[i], self._pushes
+        direction = rng.normal(size=3)
+        force = rng.uniform(*pushes.force_n) * direction / np.linalg.norm(direction)
+        start = int(self._worlds.plants[i]["tick"]) * TICK_S + rng.uniform(*pushes.pause_s)
+        stop = start + rng.uniform(*pushes.lasting_s)
+        self._worlds.push(i, f"link{rng.choice(pushes.links)}", (0.0, 0.0, 0.0), force, start, stop)

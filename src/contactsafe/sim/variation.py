@@ -1,0 +1,162 @@
+"""Worlds that differ from episode to episode: what was drawn goes into plant, camera and pictures."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from contactsafe.compiled import compiled
+from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
+from contactsafe.sim.config import Camera
+from contactsafe.sim.randomisation import MAX_DELAY_STEPS, Randomisation, draw, draw_dtype
+from contactsafe.sim.snapshot import Part, of_array, put, take
+from contactsafe.sim.world import Worlds
+
+CAMERAS = 16
+"""Cameras that stand ready: tables of one take 10 ms to compute, so episodes choose among them."""
+
+_CHANGED = ("body_pos", "body_quat", "body_mass", "body_inertia", "geom_friction", "geom_size")
+
+
+class Variation:
+    """Draws what differs and makes it so.
+
+    Args:
+        worlds: each with a model of its own.
+        ranges: that every episode draws from.
+
+    Attributes:
+        drawn: `draw_dtype` records of the episodes that run, (n,).
+    """
+
+    def __init__(self, worlds: Worlds, ranges: Randomisation):
+        self._worlds, self._ranges = worlds, ranges
+        self.drawn = np.zeros(worlds.n, dtype=draw_dtype)
+        self._plants = [_Plant(worlds, i) for i in range(worlds.n)]
+        # Their places are the same in every run: a run that goes on must find them again.
+        rng = np.random.default_rng(0)
+        cameras = [_knocked(worlds.config.camera, ranges, rng) for _ in range(CAMERAS)]
+        worlds.cameras = stack_cameras([camera_tables(c, worlds.boards[0], worlds.models[0]) for c in cameras])
+        self._frames = np.full((worlds.n, MAX_DELAY_STEPS + 1, *worlds.masks.shape[1:]), OTHER_PIXEL, dtype=np.uint8)
+        self._newest = np.zeros(worlds.n, dtype=np.int64)
+        self._random = np.ones(worlds.n, dtype=np.uint64)
+
+    def draw(self, i: int, rng: np.random.Generator) -> None:
+        """Draw anew for world i; reset it next."""
+        self.drawn[i] = draw(self._ranges, CAMERAS, rng)
+        self._random[i] = rng.integers(1, 2**63)
+        self._apply(i)
+
+    def look(self, start: int, stop: int) -> None:
+        """Take the masks of worlds start to stop as they are, and put what the policy sees of them in their place."""
+        _look(start, stop, self.drawn, self._worlds.masks, self._frames, self._newest, self._random)
+
+    def look_first(self, i: int) -> None:
+        """The same, as if what is seen had been there for long."""
+        _spoil(self._worlds.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
+        self._frames[i] = self._worlds.masks[i]
+
+    def parts(self) -> dict[str, Part]:
+        """List what decides the future."""
+        return {
+            "drawn": Part(self._taken, self._put_drawn),
+            "frames": of_array(self._frames),
+            "newest": of_array(self._newest),
+            "random": of_array(self._random.view(np.int64)),
+        }
+
+    def snapshot(self) -> dict[str, Any]:
+        """Take all that decides the future."""
+        return take(self.parts())
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Put the worlds' models where a snapshot was taken; their state is put back by the worlds, after this."""
+        put(self.parts(), snapshot)
+
+    def _taken(self) -> dict[str, np.ndarray]:
+        return {name: self.drawn[name].copy() for name in draw_dtype.names or ()}
+
+    def _put_drawn(self, value: Mapping[str, np.ndarray]) -> None:
+        for name in draw_dtype.names or ():
+            self.drawn[name] = value[name]
+        for i in range(self._worlds.n):
+            self._apply(i)
+
+    def _apply(self, i: int) -> None:
+        self._worlds.plants[i]["camera"] = self.drawn[i]["camera"]
+        self._plants[i].apply(self.drawn[i])
+
+
+def _knocked(camera: Camera, ranges: Randomisation, rng: np.random.Generator) -> Camera:
+    """Draw where a camera really stands and looks; turning it moves what it looks at."""
+    moved, turned = rng.uniform(*ranges.camera_m, 3), rng.uniform(*ranges.camera_rad, 3)
+    position = np.array(camera.position) + moved
+    sight = np.array(camera.target) + moved - position
+    sight = sight + np.cross(turned, sight)
+    return replace(camera, position=tuple(position.tolist()), target=tuple((position + sight).tolist()))
+
+
+class _Plant:
+    """One world's plant as it was built, from which every draw starts."""
+
+    def __init__(self, worlds: Worlds, i: int):
+        model, self._record = worlds.models[i], worlds.plants[i]
+        self._model = model
+        self._friction, self._pad_half = self._record["friction"].copy(), self._record["pad_half"].copy()
+        self._delay = int(self._record["delay_ticks"])
+        self._board, self._tool, self._pad = model.body("board").id, model.body("tool").id, model.geom("pad").id
+        self._links = [k for k in range(model.nbody) if model.body(k).name.startswith("link")]
+        self._kept = {name: getattr(model, name).copy() for name in _CHANGED}
+
+    def apply(self, drawn) -> None:
+        """Make model and record those that were drawn."""
+        model, plant = self._model, self._record
+        for name, value in self._kept.items():
+            getattr(model, name)[:] = value
+        model.body_pos[self._board, 2] += drawn["board_height_m"]
+        mujoco.mju_euler2Quat(model.body_quat[self._board], [*drawn["board_tilt_rad"], 0.0], "xyz")
+        model.geom_friction[self._pad, 0] *= drawn["friction"]
+        model.geom_size[self._pad, :2] *= drawn["pad_size"]
+        model.body_mass[self._links] *= drawn["inertia"]
+        model.body_inertia[self._links] *= drawn["inertia"]
+        model.body_mass[self._tool] += drawn["payload_kg"]
+        plant["friction"] = self._friction
+        plant["friction"][:, 0] *= drawn["joint_friction"]
+        plant["pad_half"] = self._pad_half * drawn["pad_size"]
+        plant["delay_ticks"] = max(self._delay, drawn["torque_delay_ticks"])
+
+
+@compiled(nogil=True)
+def _look(start, stop, drawn, masks, frames, newest, random):
+    for i in range(start, stop):
+        _spoil(masks[i], drawn[i : i + 1], random[i : i + 1])
+        count = frames.shape[1]
+        newest[i] = (newest[i] + 1) % count
+        frames[i, newest[i]] = masks[i]
+        masks[i] = frames[i, (newest[i] - drawn[i].delay_steps) % count]
+
+
+@compiled(nogil=True)
+def _spoil(mask, drawn, random):
+    """Miss some ink pixels of a mask and invent others."""
+    missed, invented = drawn[0].ink_missed, drawn[0].ink_invented
+    flat = mask.reshape(-1)
+    if missed > 0.0:
+        for p in range(flat.shape[0]):
+            if flat[p] == INK_PIXEL and _uniform(random) < missed:
+                flat[p] = OTHER_PIXEL
+    for _ in range(int(invented + _uniform(random))):
+        flat[int(_uniform(random) * flat.shape[0])] = INK_PIXEL
+
+
+@compiled
+def _uniform(random):
+    """Draw from [0, 1): xorshift64* of Vigna 2016; its state is `random`, (1,) uint64."""
+    x = random[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    random[0] = x
+    return ((x * np.uint64(2685821657736338717)) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
