@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+import torch
 from stable_baselines3 import PPO, SAC
 from torch import nn
 
@@ -24,11 +25,15 @@ class PpoConfig(PolicyConfig):
         max_grad_norm: gradients are clipped to this.
         target_kl: an update stops early when the policy moved further than this.
         log_std_init: log of the first standard deviation of each action.
+        log_std_final: of the last; between them it falls linearly, for the mean alone, which is what is shipped, stands
+            still before ink that exploration gets at by chance.
     """
 
     algorithm: ClassVar[str] = "ppo"
 
     out: Path = Path("runs/ppo")
+    batch: int = 1024
+    learning_rate: float = 5e-4
     epochs: int = 5
     gae_lambda: float = 0.95
     clip_range: float = 0.2
@@ -37,6 +42,7 @@ class PpoConfig(PolicyConfig):
     max_grad_norm: float = 0.5
     target_kl: float = 0.03
     log_std_init: float = -1.0
+    log_std_final: float = -2.5
 
     def make_model(self, env):
         """Make an untrained PPO."""
@@ -62,6 +68,12 @@ class PpoConfig(PolicyConfig):
             seed=self.seed,
             device="cpu",
         )
+
+    def prepare_rollout(self, model):
+        """Let exploration fall with the steps done."""
+        done = min(model.num_timesteps / self.total_steps, 1.0)
+        with torch.no_grad():
+            model.policy.log_std.fill_(self.log_std_init + done * (self.log_std_final - self.log_std_init))
 
     def actor(self, model):
         """Give the mean of the action distribution."""

@@ -62,7 +62,7 @@ class PolicyConfig:
     env_id: str = "contactsafe/Wiping-v0"
     randomise: bool = True
     num_envs: int = 16
-    total_steps: int = 3_000_000
+    total_steps: int = 1_500_000
     max_minutes: float = 0.0
     rollout_steps: int = 256
     batch: int = 512
@@ -106,6 +106,13 @@ class PolicyConfig:
         Actions are clipped to [-1, 1] by who uses it.
         """
         raise NotImplementedError
+
+    def prepare_rollout(self, model: Any) -> None:
+        """Set what changes with the steps done, before a rollout; nothing by default.
+
+        Args:
+            model: as `make_model` gave it; its `num_timesteps` say how far it is.
+        """
 
     def falling_rate(self) -> Callable[[float], float]:
         """Give the learning rate by the share of total_steps still ahead: absolute, so a resumed run has the same."""

@@ -73,6 +73,7 @@ class Recorder(BaseCallback):
         steps, saved = self.model.num_timesteps, self.run.saved_steps
         if saved < 0 or steps - saved >= self.period or (self.over and steps > saved):
             self._close_rollout()
+        self.config.prepare_rollout(self.model)
 
     def _on_step(self):
         self.bar.update(self.training_env.num_envs)
