@@ -51,7 +51,7 @@ def test_every_command_has_help(name, capsys):
     assert "Traceback" not in out
 
 
-@pytest.mark.parametrize("kind", ["vae", "ppo"])
+@pytest.mark.parametrize("kind", ["vae", "ppo", "sac"])
 def test_training_has_help_of_its_own(kind, capsys):
     pytest.importorskip("torch")
     with pytest.raises(SystemExit) as stop:
@@ -106,7 +106,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         ("evaluate --controller best", "controller 'best' is unknown; choose from vices, paper, safe"),
         ("evaluate --episodes 0", "episodes = 0; give 1 or more"),
         ("evaluate --seed -2", "seed = -2; give 0 or more"),
-        ("train dog", "'contactsafe train dog' is unknown; choose vae or ppo"),
+        ("train dog", "'contactsafe train dog' is unknown; choose vae, ppo or sac"),
     ],
 )
 def test_mistakes_are_told_in_one_line_with_the_remedy(words, text, capsys):
@@ -149,7 +149,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(command, b
     assert told == f"cannot write to {out}: not a directory; give a folder you may write to with --out"
 
 
-@pytest.mark.parametrize("kind", ["vae", "ppo"])
+@pytest.mark.parametrize("kind", ["vae", "ppo", "sac"])
 def test_training_without_the_extra_says_what_to_install(kind, capsys, monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else find(name))

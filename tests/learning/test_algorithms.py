@@ -44,6 +44,21 @@ class Td3Config(PolicyConfig):
         return model.actor.mu
 
 
+def test_a_time_limit_is_no_end_to_an_off_policy_algorithm_either(vae, tmp_path, monkeypatch):
+    """The memory knows it for what it is, and the value behind it counts."""
+    models = []
+    make_model = SacConfig.make_model
+    monkeypatch.setattr(SacConfig, "make_model", lambda self, env: models.append(make_model(self, env)) or models[0])
+    monkeypatch.setattr("contactsafe.learning.train_policy.export_bundle", lambda *args, **options: None)
+    config = SacConfig(
+        vae=vae, out=tmp_path / "run", buffer=512, learning_starts=512, **{**SMALL, "evaluate_episodes": 0}
+    )
+    train_policy(config, lambda n: FakeWiping(n, max_steps=9))
+    memory = models[0].replay_buffer
+    assert memory.dones[:64].sum() == 4 * 7
+    np.testing.assert_array_equal(memory.timeouts, memory.dones)
+
+
 @pytest.mark.parametrize(
     "config",
     [SacConfig(buffer=512, learning_starts=64, **SMALL), Td3Config(**SMALL), PpoConfig(epochs=1, **SMALL)],
