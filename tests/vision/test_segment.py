@@ -76,6 +76,12 @@ def test_ink_of_any_colour_is_ink(segmenter, channel):
     assert agreement(segmenter.segment(np.clip(np.stack(planes, -1), 0, 255).astype(np.uint8)), where) > 0.85
 
 
+def test_the_scale_of_a_homography_means_nothing(segmenter):
+    picture = photo(written(board())[0])
+    for scale in (-1.0, 0.01):
+        assert_array_equal(Segmenter(scale * H, CORNERS).segment(picture), segmenter.segment(picture))
+
+
 def test_a_grey_picture_does_as_well(segmenter):
     picture, where = written(board())
     assert agreement(segmenter.segment(photo(picture)[..., 0]), where) > 0.85

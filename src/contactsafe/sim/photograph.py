@@ -14,7 +14,7 @@ from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import BoardConfig, Camera
 from contactsafe.sim.whiteboard import INK
-from contactsafe.vision.silhouette import Solids, cast, fill, project, rims, silhouette
+from contactsafe.vision.silhouette import Solids, cast, fill, on_plane, project, rims, silhouette
 
 PHOTO_PX = 455
 """Pixels along an edge of a photograph: the square that `Camera` says the mask is scaled from."""
@@ -200,7 +200,7 @@ class Photographer:
         light *= 1 - c.edge_depth / (1 + np.exp(-np.clip(across / (c.edge_soft / 4), -30, 30)))
         homography = np.array([[1, 0, c.shift[0]], [0, 1, c.shift[1]], [0, 0, 1]]) @ self.homography
         on_board = np.zeros((n, n), np.uint8)
-        fill(on_board, _seen(homography, self.corners), 1)
+        fill(on_board, on_plane(self.corners, homography), 1)
         dirt = 1 - c.smudge * np.clip(_smooth_noise(rng, 7), 0, 2) / 2
         grain = 1 + 0.06 * _smooth_noise(rng, 40) + 0.04 * _smooth_noise(rng, 150)
         white = 255 * c.exposure / max(_BOARD)
@@ -243,25 +243,23 @@ class Photographer:
         coarse = 5
         dark = np.zeros((PHOTO_PX // coarse,) * 2, np.uint8)
         lamp = np.array(c.lamp)
-        for rim in rims(solids, lamp):
-            fill(dark, _seen(scene.homography, cast(rim, lamp, self._board.centre[2])) / coarse, 255 * c.arm_depth)
+        fallen = cast(rims(solids, lamp), lamp, self._board.centre[2])
+        for outline in on_plane(fallen, scene.homography) / coarse:
+            fill(dark, outline, 255 * c.arm_depth)
         soft = cv2.GaussianBlur(dark, (0, 0), c.arm_soft / coarse)
         return cv2.resize(soft, (PHOTO_PX, PHOTO_PX), interpolation=cv2.INTER_LINEAR)
 
     def _stand_before(self, picture: np.ndarray, c: Conditions, solids: Solids) -> None:
         """Draw the arm, the furthest shape first, each lighter along its middle."""
         light = 255 * c.exposure * np.array(c.tint)
-        layers = [
-            rims(
-                solids._replace(sizes=np.where(solids.is_box[:, None], 1.0, [width, 1.0, 1.0]) * solids.sizes),
-                self._eye,
-            )
-            for width, _ in _ROUNDNESS
-        ]
-        seen = [[project(rim, self._projection) + c.shift for rim in layer] for layer in layers]
+        round_ones = ~solids.is_box[:, None]
+        layers = []
+        for width, tone in _ROUNDNESS:
+            slim = solids._replace(sizes=np.where(round_ones, [width, 1.0, 1.0], 1.0) * solids.sizes)
+            layers.append((project(rims(slim, self._eye), self._projection) + c.shift, tone))
         for k in np.argsort(-np.linalg.norm(solids.centres - self._eye, axis=1)):
-            for layer, (_, tone) in zip(seen, _ROUNDNESS[: 1 if solids.is_box[k] else None], strict=False):
-                fill(picture, layer[k], tuple(np.minimum(tone * light * self._colours[k], 255.0)))
+            for outlines, tone in layers[: 1 if solids.is_box[k] else None]:
+                fill(picture, outlines[k], tuple(np.minimum(tone * light * self._colours[k], 255.0)))
 
 
 def _darkened(picture: np.ndarray, cover: np.ndarray, reflectance) -> np.ndarray:
@@ -273,12 +271,6 @@ def _darkened(picture: np.ndarray, cover: np.ndarray, reflectance) -> np.ndarray
 
 def _of_three(plane: np.ndarray) -> np.ndarray:
     return cv2.merge([plane, plane, plane])
-
-
-def _seen(H: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Pixels of points of the board's plane, (m, 2)."""
-    seen = np.column_stack([points, np.ones(len(points))]) @ H.T
-    return seen[:, :2] / seen[:, 2:]
 
 
 def _smooth_noise(rng: np.random.Generator, waves: int) -> np.ndarray:

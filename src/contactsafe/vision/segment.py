@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
-from contactsafe.vision.silhouette import fill
+from contactsafe.vision.silhouette import fill, on_plane
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
@@ -58,9 +58,10 @@ class Segmenter:
             raise InvalidInputError(f"photo_size = {photo_size}, mask_size = {mask_size}; give 8 or more pixels")
         self.photo_size, self.mask_size = photo_size, mask_size
         self.faint, self.clear, self.sharp, self.least_px, self.share = faint, clear, sharp, least_px, share
-        seen = np.column_stack([corners, np.ones(4)]) @ homography.T
         board = np.zeros((photo_size, photo_size), np.uint8)
-        fill(board, seen[:, :2] / seen[:, 2:], 255)
+        depths = corners @ homography[2, :2] + homography[2, 2]
+        if (depths > 0).all() or (depths < 0).all():
+            fill(board, np.clip(on_plane(corners, homography), -1e4, 1e4), 255)
         self._rim = np.ones((2 * rim_px + 1,) * 2, np.uint8)
         self._board = cv2.erode(board, self._rim, borderType=cv2.BORDER_REPLICATE)
         left, top, width, height = cv2.boundingRect(self._board)
@@ -153,15 +154,21 @@ def _background(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
     return cv2.resize(smooth, picture.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
+def _histogram(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Count the grey levels of what is seen, of every third pixel each way, (256,)."""
+    sample, looked_at = (np.ascontiguousarray(plane[::3, ::3]) for plane in (picture, seen))
+    return cv2.calcHist([sample], [0], looked_at, [256], [0, 256]).ravel()
+
+
 def _level(picture: np.ndarray, seen: np.ndarray, share: float) -> int:
     """Grey level below which this share of what is seen lies."""
-    counts = np.cumsum(cv2.calcHist([picture], [0], seen, [256], [0, 256]).ravel())
+    counts = np.cumsum(_histogram(picture, seen))
     return int(np.searchsorted(counts, share * counts[-1]))
 
 
 def _middle_and_spread(picture: np.ndarray, seen: np.ndarray) -> tuple[float, float]:
     """Median of what is seen, and the noise about it: 1.48 times the median distance, at least half a level."""
-    counts = cv2.calcHist([picture], [0], seen, [256], [0, 256]).ravel()
+    counts = _histogram(picture, seen)
     total = counts.sum()
     middle = int(np.searchsorted(np.cumsum(counts), 0.5 * total))
     away = np.bincount(np.abs(np.arange(256) - middle), weights=counts)

@@ -28,7 +28,7 @@ class Solids(NamedTuple):
     axes: np.ndarray
 
 
-def rims(solids: Solids, eye: np.ndarray) -> list[np.ndarray]:
+def rims(solids: Solids, eye: np.ndarray) -> np.ndarray:
     """Find points in space whose hull, from where the eye is, covers each solid; a shade more for what is round.
 
     Args:
@@ -36,15 +36,14 @@ def rims(solids: Solids, eye: np.ndarray) -> list[np.ndarray]:
         eye: (3,), world, m.
 
     Returns:
-        One array of points, (m, 3), world, m, for each solid.
+        Points, (k, m, 3), world, m.
     """
+    corners = solids.centres[:, None] + (_CORNERS * solids.sizes[:, None]) @ solids.axes.transpose(0, 2, 1)
     halves = solids.sizes[:, 1, None] * solids.axes[:, :, 2]
     ends = solids.centres[:, None] + np.stack([-halves, halves], axis=1)
-    round_rims = _rims_of_spheres(ends, solids.sizes[:, :1], eye)
-    return [
-        centre + (_CORNERS * size) @ axes.T if is_box else rim.reshape(-1, 3)
-        for is_box, size, centre, axes, rim in zip(*solids, round_rims, strict=True)
-    ]
+    round_rims = _rims_of_spheres(ends, solids.sizes[:, :1], eye).reshape(len(ends), -1, 3)
+    corners = np.tile(corners, (1, round_rims.shape[1] // len(_CORNERS), 1))
+    return np.where(solids.is_box[:, None, None], corners, round_rims)
 
 
 def _rims_of_spheres(centres: np.ndarray, radii: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -61,20 +60,26 @@ def _rims_of_spheres(centres: np.ndarray, radii: np.ndarray, eye: np.ndarray) ->
 
 
 def project(points: np.ndarray, projection: np.ndarray) -> np.ndarray:
-    """Give the pixels, (m, 2), of points in space.
+    """Give the pixels, (..., 2), of points in space.
 
     Args:
-        points: (m, 3), world, m.
+        points: (..., 3), world, m.
         projection: (3, 4) of a camera, its last row the depth in m.
     """
     seen = points @ projection[:, :3].T + projection[:, 3]
-    return seen[:, :2] / np.maximum(seen[:, 2:], _NEAR)
+    return seen[..., :2] / np.maximum(seen[..., 2:], _NEAR)
 
 
 def cast(points: np.ndarray, lamp: np.ndarray, z: float) -> np.ndarray:
-    """Give where the shadows of points fall on the plane at height z, (m, 2), m; the lamp is above them."""
-    below = np.maximum(lamp[2] - points[:, 2], _NEAR)
-    return lamp[:2] + (points[:, :2] - lamp[:2]) * ((lamp[2] - z) / below)[:, None]
+    """Give where the shadows of points, (..., 3), fall on the plane at height z, (..., 2), m; the lamp is above."""
+    below = np.maximum(lamp[2] - points[..., 2:], _NEAR)
+    return lamp[:2] + (points[..., :2] - lamp[:2]) * ((lamp[2] - z) / below)
+
+
+def on_plane(points: np.ndarray, homography: np.ndarray) -> np.ndarray:
+    """Give the pixels, (..., 2), of points (..., 2), m, of the plane that a homography, (3, 3), belongs to."""
+    seen = points @ homography[:, :2].T + homography[:, 2]
+    return seen[..., :2] / seen[..., 2:]
 
 
 def fill(picture: np.ndarray, pixels: np.ndarray, value) -> None:
@@ -85,7 +90,7 @@ def fill(picture: np.ndarray, pixels: np.ndarray, value) -> None:
         pixels: (m, 2), columns and rows; the middle of pixel (0, 0) is (0.5, 0.5).
         value: a number, or three.
     """
-    fixed = np.round((np.clip(pixels, -1e4, 1e4) - 0.5) * 2**_SUBPIXEL).astype(np.int32)
+    fixed = np.rint((pixels - 0.5) * 2**_SUBPIXEL).astype(np.int32)
     cv2.fillConvexPoly(picture, cv2.convexHull(fixed), value, shift=_SUBPIXEL)
 
 
@@ -102,6 +107,6 @@ def silhouette(solids: Solids, eye: np.ndarray, projection: np.ndarray, size: in
         uint8, (size, size).
     """
     picture = np.zeros((size, size), np.uint8)
-    for rim in rims(solids, eye):
-        fill(picture, project(rim, projection), 255)
+    for outline in project(rims(solids, eye), projection):
+        fill(picture, outline, 255)
     return picture
