@@ -23,10 +23,13 @@ def test_wiping_counts_force_only_while_the_pad_touches():
     run["tool_force"][500:600, 0] = 8.0
     run["ink_left"] = 0.25
     run["mode"][900:] = 1
+    run["K_task"][:500, 2], run["K_task"][500:, 2] = 80.0, 200.0
     metrics = wiping_metrics(run, clean=False)
     assert metrics["ink_removed"] == 0.75
     assert metrics["tool_force_median_n"] == 6.0
     assert metrics["tool_force_peak_n"] == metrics["tool_force_p95_n"] == 10.0
+    assert metrics["landing_peak_n"] == 10.0
+    assert (metrics["stiffness_z_free"], metrics["stiffness_z_contact"]) == (80.0, 200.0)
     assert metrics["contact_mode_share"] == 0.1
     assert math.isnan(metrics["time_s"])
     assert wiping_metrics(run, clean=True)["time_s"] == 0.999
@@ -36,6 +39,7 @@ def test_a_tool_that_never_touched_has_no_force_of_contact():
     metrics = wiping_metrics(trace(10), clean=False)
     assert metrics["tool_force_peak_n"] == 0.0
     assert math.isnan(metrics["tool_force_median_n"])
+    assert math.isnan(metrics["landing_peak_n"])
 
 
 def collision():

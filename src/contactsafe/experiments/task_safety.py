@@ -13,6 +13,8 @@ QUESTION = (
 )
 SCENARIO = "wiping"
 _TOUCHING_N = 0.5  # pad force above which a tick counts as contact
+_LANDING_TICKS = 200  # after the first of them
+_Z = 2
 
 
 def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
@@ -57,6 +59,28 @@ def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
         "time_s": float(trace["time"][-1]) if clean else float("nan"),
         "tool_force_peak_n": float(force.max()),
         "tool_force_median_n": float(np.median(force[touching])) if touching.any() else float("nan"),
+        "landing_peak_n": landing_peak(force, touching),
+        "stiffness_z_free": _mean(trace["K_task"][~touching, _Z]),
+        "stiffness_z_contact": _mean(trace["K_task"][touching, _Z]),
+        "damping_z_free": _mean(trace["D_task"][~touching, _Z]),
+        "damping_z_contact": _mean(trace["D_task"][touching, _Z]),
         "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
         "contact_mode_share": float(trace["mode"].mean()),
     }
+
+
+def landing_peak(force: np.ndarray, touching: np.ndarray) -> float:
+    """Give the largest force within 0.2 s of the first touch, N; NaN where nothing was touched.
+
+    Args:
+        force: of the board on the tool, tick by tick, (T,), N.
+        touching: which ticks count as contact, (T,).
+    """
+    if not touching.any():
+        return float("nan")
+    first = int(np.argmax(touching))
+    return float(force[first : first + _LANDING_TICKS].max())
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else float("nan")

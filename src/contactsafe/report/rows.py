@@ -136,6 +136,11 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("tool_force_peak_n", "tool force, peak", "N", main=True, aim=Aim(below=40.0, worst=True)),
         Row("tool_force_median_n", "tool force, median in contact", "N", main=True, aim=Aim(below=10.0, above=2.0)),
         Row("tool_force_p95_n", "tool force, 95th percentile in contact", "N"),
+        Row("landing_peak_n", "tool force, peak on landing", "N", aim=Aim(below=20.0)),
+        Row("stiffness_z_free", "stiffness across the board, in the air", "1/s²"),
+        Row("stiffness_z_contact", "stiffness across the board, in contact", "1/s²"),
+        Row("damping_z_free", "damping across the board, in the air", "1/s"),
+        Row("damping_z_contact", "damping across the board, in contact", "1/s"),
     ),
     "joint-safety": (
         Row("contact_steady_n", "contact force, steady", "N", main=True, aim=Aim(share=1 / 3)),

@@ -113,8 +113,13 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
             Panel(f"tool force, {axis} (N)", _component("tool_force", i), noisy=True) for i, axis in enumerate("xyz")
         ]
         single.append(Panel("ink left (%)", lambda run: 100 * run.trace["ink_left"]))
+        single.append(Panel("stiffness K1, z (1/s²)", _component("K_task", 2)))
+        single.append(Panel("damping D1, z (1/s)", _component("D_task", 2)))
         drawn = [plotter.plot(experiment, name, [panel]) for name in names for panel in single]
-        said = "Force of the board on the tool along the world's axes, mean and, pale, range; ink left."
+        said = (
+            "Force of the board on the tool along the world's axes, mean and, pale, range; ink left; stiffness and "
+            "damping across the board, as the policy chose them."
+        )
         return _figure(drawn, experiment, said, "plots two")
     if experiment.name == "disturbance":
         panels = [Panel(f"tool error, {axis} (mm)", _component("error", i, 1000.0)) for i, axis in enumerate("xyz")]

@@ -101,6 +101,8 @@ def trace_dtype(n: int) -> np.dtype:
             ("torque", _f, (n,)),  # command, N m
             ("position", _f, (3,)),  # tool, m
             ("error", _f, (6,)),  # x_d − x, m and rad
+            ("K_task", _f, (6,)),  # in force, 1/s²
+            ("D_task", _f, (6,)),  # in force, 1/s
             ("tool_force", _f, (3,)),  # board on pad by the simulator, world axes, N
             ("wrench_ee", _f, (6,)),  # as measured
             ("obstacle_force", _f),  # largest |force| of one obstacle on the arm by the simulator, N

@@ -221,6 +221,8 @@ def _record(plant, controller, row):
     row.torque[:] = out.torque
     row.position[:] = tool_position(plant)
     row.error[:] = out.error
+    row.K_task[:] = controller.state.K_task
+    row.D_task[:] = controller.state.D_task
     row.wrench_ee[:] = controller.measurement.wrench_ee
     row.residual[:] = out.residual
     row.residual_trigger[:] = out.residual_trigger
