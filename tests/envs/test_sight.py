@@ -1,5 +1,7 @@
 """Boards by kind and masks by way of photographs, as the environment's configuration asks for."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import gymnasium
@@ -95,17 +97,11 @@ def test_other_kinds_are_refused(fields, text):
 
 
 def test_without_opencv_the_remedy_is_named():
-    import subprocess
-    import sys
-
     code = (
         "import sys; sys.modules['cv2'] = None\n"
-        "from contactsafe.envs.config import WipingConfig\n"
-        "from contactsafe.envs.tasks import WipingTasks\n"
-        "from contactsafe.errors import InvalidInputError\n"
-        "WipingTasks(WipingConfig())\n"
-        "try:\n    WipingTasks(WipingConfig(sight='photograph'))\n"
-        "except InvalidInputError as error:\n    print(error)"
+        "import contactsafe.envs.tasks\n"
+        "try:\n    import contactsafe.envs.sight\n"
+        "except contactsafe.ContactSafeError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "photographs need OpenCV; run: pip install 'contactsafe[camera]'", done.stderr

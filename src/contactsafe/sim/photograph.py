@@ -6,7 +6,6 @@ seed and everything of a picture from that and its number, so there is no state 
 
 from dataclasses import dataclass, replace
 
-import cv2
 import mujoco
 import numpy as np
 
@@ -14,6 +13,7 @@ from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import BoardConfig, Camera
 from contactsafe.sim.whiteboard import INK
+from contactsafe.vision import cv2
 from contactsafe.vision.silhouette import Solids, cast, fill, on_plane, project, rims, silhouette
 
 PHOTO_PX = 455

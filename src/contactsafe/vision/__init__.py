@@ -3,6 +3,6 @@
 from contactsafe.errors import InvalidInputError
 
 try:
-    import cv2  # noqa: F401
+    import cv2 as cv2
 except ImportError as error:
     raise InvalidInputError("photographs need OpenCV; run: pip install 'contactsafe[camera]'") from error
