@@ -1,5 +1,7 @@
 """Somebody leans on the arm while it works: in turn, within the ranges, the same for the same seed."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -29,7 +31,7 @@ def pushed(steps=120, seed=3):
 def test_pushes_follow_one_another_within_their_ranges_and_move_the_arm():
     plans, way = pushed()
     assert len(plans) >= 3
-    for (_, _, stop, *_), (_, start, *_) in zip(plans[:-1], plans[1:], strict=True):
+    for (_, _, stop, *_), (_, start, *_) in itertools.pairwise(plans):
         assert start > stop
     for _, start, stop, *force in plans:
         assert 195 <= stop - start <= 405
