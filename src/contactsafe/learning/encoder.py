@@ -1,4 +1,4 @@
-"""The β-VAE: a mask to a 128-d Gaussian latent and back (paper, section III-F).
+"""The β-VAE: a mask to a Gaussian latent of 128 numbers, or another multiple of 64, and back (paper, section III-F).
 
 Fully convolutional, so a latent number belongs to a place in the picture: two numbers for each cell of an 8 x 8 grid.
 The policy reads "where is ink" off that with a small network; off a dense code it would have to learn geometry first.
@@ -12,13 +12,8 @@ from torch.nn import functional
 
 from contactsafe.errors import InvalidInputError
 
-LATENT = 128
-"""Numbers in the latent (paper, section IV-A)."""
-
 GRID = 8
 """Latent cells along a side of the picture."""
-
-MAPS = LATENT // GRID**2
 
 
 @dataclass(frozen=True)
@@ -28,15 +23,24 @@ class EncoderConfig:
     Attributes:
         size: pixels along a side of the picture; a multiple of 32.
         channels: feature maps after each of the three strided convolutions.
+        maps: latent numbers in each of the 8 x 8 cells; 2 make the paper's 128 (section IV-A).
     """
 
     size: int = 128
     channels: tuple[int, int, int] = (12, 16, 32)
+    maps: int = 2
 
     def __post_init__(self):
         """Refuse a size that the three strides do not bring down to the grid."""
         if self.size < 32 or self.size % 32:
             raise InvalidInputError(f"encoder.size = {self.size}; give a multiple of 32")
+        if self.maps < 1:
+            raise InvalidInputError(f"encoder.maps = {self.maps}; give 1 or more")
+
+    @property
+    def latent(self) -> int:
+        """Numbers in the latent."""
+        return self.maps * GRID**2
 
 
 class VAE(nn.Module):
@@ -54,11 +58,11 @@ class VAE(nn.Module):
             nn.ReLU(),
             nn.Conv2d(second, third, 3, 2, padding=1),
             nn.ReLU(),
-            nn.Conv2d(third, 2 * MAPS, 1),
+            nn.Conv2d(third, 2 * config.maps, 1),
         )
         # Plain convolutions, their maps shuffled into place: cheaper than transposed ones, and no checkerboard.
         self.decoder = nn.Sequential(
-            nn.Conv2d(MAPS, third, 3, padding=1),
+            nn.Conv2d(config.maps, third, 3, padding=1),
             nn.ReLU(),
             nn.Conv2d(third, 4 * second, 3, padding=1),
             nn.PixelShuffle(2),
@@ -74,16 +78,16 @@ class VAE(nn.Module):
         self.to(memory_format=torch.channels_last)
 
     def encode(self, ink):
-        """Give mean and log-variance of the latent, each (N, 128)."""
+        """Give mean and log-variance of the latent, each (N, latent)."""
         mean, log_var = self.encoder(ink).chunk(2, dim=1)
         return mean.flatten(1), log_var.flatten(1).clamp(-10.0, 4.0)
 
     def decode(self, latent):
         """Give the logit of ink at each pixel, (N, 1, size, size)."""
-        return self.decoder(latent.reshape(-1, MAPS, GRID, GRID))
+        return self.decoder(latent.reshape(-1, self.config.maps, GRID, GRID))
 
     def forward(self, ink, noise):
-        """Encode, sample with the given standard normal noise (N, 128), decode: (logits, mean, log_var)."""
+        """Encode, sample with the given standard normal noise (N, latent), decode: (logits, mean, log_var)."""
         mean, log_var = self.encode(ink)
         return self.decode(mean + noise * torch.exp(0.5 * log_var)), mean, log_var
 
@@ -96,8 +100,8 @@ def vae_loss(logits, ink, mean, log_var, kl_weight, ink_weight):
     Args:
         logits: log-odds of ink, (N, 1, size, size).
         ink: the picture, 1 is ink, same shape.
-        mean: of the latent, (N, 128).
-        log_var: of the latent, (N, 128).
+        mean: of the latent, (N, latent).
+        log_var: of the latent, (N, latent).
         kl_weight: the paper's β.
         ink_weight: how many blank pixels one ink pixel counts for.
 
@@ -113,7 +117,7 @@ def vae_loss(logits, ink, mean, log_var, kl_weight, ink_weight):
 
 
 class MaskEncoder(nn.Module):
-    """What is exported: masks (N, size, size) uint8, ink 0, to the latent's mean (N, 128) float32."""
+    """What is exported: masks (N, size, size) uint8, ink 0, to the latent's mean (N, latent) float32."""
 
     def __init__(self, vae: VAE):
         super().__init__()

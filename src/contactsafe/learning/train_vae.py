@@ -20,7 +20,7 @@ from contactsafe.learning.checkpoints import (
     write_json,
 )
 from contactsafe.learning.datasets import make_dataset
-from contactsafe.learning.encoder import LATENT, VAE, EncoderConfig, vae_loss
+from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
 from contactsafe.learning.perception import Perception
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
@@ -135,7 +135,7 @@ def _train_epoch(vae, optimiser, data, epoch, config):
             group["lr"] = config.learning_rate * (0.02 + 0.98 * falling)
         kl_weight = config.kl_weight * min(1.0, progress / max(config.warmup_epochs, 1e-9))
         ink = torch.from_numpy(data.ink(order[step * config.batch : (step + 1) * config.batch]))
-        logits, mean, log_var = vae(ink, torch.randn((len(ink), LATENT), generator=noise))
+        logits, mean, log_var = vae(ink, torch.randn((len(ink), config.encoder.latent), generator=noise))
         loss, *parts = vae_loss(logits, ink, mean, log_var, kl_weight, config.ink_weight)
         optimiser.zero_grad()
         loss.backward()
