@@ -53,7 +53,7 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
         ink_removed_mean, _median, _p10: share of the ink, 0..1;
         time_mean_s: length of an episode; time_to_clean_median_s: of the successful, NaN if none; peak_force_median_n,
         _p95_n, _max_n: largest tool force of an episode; contact_force_median_n: of all steps in contact, each
-        counted with its largest force;
+        counted with its largest force; arm_table_contacts: episodes ended by any part but the pad on board or table;
         contact_share: of all steps; return_mean; records: a dict per episode, by environment and then by time.
 
     Raises:
@@ -79,6 +79,7 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
         done = np.asarray(terminated) | np.asarray(truncated)
         force = step_values(info, done, "tool_force_n")
         ink_left, success = step_values(info, done, "ink_left"), step_values(info, done, "is_success")
+        touched = step_values(info, done, "arm_touched")
         active = np.array([len(r) < quota for r in records])
         all_steps += int(active.sum())
         contact_forces.append(force[active & (force > CONTACT_N)])
@@ -90,6 +91,7 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
                     "ink_removed": float(1.0 - ink_left[i]),
                     "time_s": float(steps[i] / rate_hz),
                     "peak_force_n": float(peak[i]),
+                    "arm_touched": bool(touched[i]),
                     "return": float(returns[i]),
                 }
             )
@@ -120,6 +122,7 @@ def _summary(records, contact_forces, all_steps):
         "peak_force_p95_n": float(np.quantile(peaks, 0.95)),
         "peak_force_max_n": float(peaks.max()),
         "contact_force_median_n": float(np.median(forces)) if len(forces) else 0.0,
+        "arm_table_contacts": int(sum(r["arm_touched"] for r in records)),
         "contact_share": float(len(forces) / all_steps),
         "return_mean": float(returns.mean()),
         "records": records,
