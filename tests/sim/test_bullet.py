@@ -42,7 +42,7 @@ def test_torque_accelerates_the_arm_as_the_nominal_inertia_says():
         plant.reset(q)
         plant.step(dynamics["g"] + tau)
         wanted = dynamics["M_inv"] @ tau
-        assert_allclose(plant.qd / TICK_S, wanted, atol=0.01 * np.abs(wanted).max())
+        assert_allclose(plant.qd / TICK_S, wanted, atol=0.004 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("error", [PlantConfig(inertia_scale=1.2), PlantConfig(payload_kg=0.5)])
@@ -50,8 +50,9 @@ def test_an_arm_heavier_than_believed_sinks(error):
     q = panda().home
     plant = BulletPlant(panda(), replace(FAR_BELOW, plant=error), TICK_S)
     plant.reset(q)
-    plant.step(panda().dynamics(q, np.zeros(7))["g"])
-    assert plant.qd[1] / TICK_S > 0.5
+    dynamics = panda().dynamics(q, np.zeros(7))
+    plant.step(dynamics["g"])
+    assert (dynamics["J"] @ plant.qd)[2] / TICK_S < -0.5  # m/s²
 
 
 @pytest.mark.parametrize("config", [CALM, WorldConfig()], ids=["calm", "noisy"])
@@ -72,8 +73,9 @@ def test_free_motion_is_the_same_in_both_engines():
         aim(worlds, (0.45, 0.15, 0.1))
         paths.append(run(worlds, 1000)[0])
     assert np.linalg.norm(paths[0]["position"][-1] - paths[0]["position"][0]) > 0.2
-    assert_allclose(paths[1]["position"], paths[0]["position"], atol=5e-4)
-    assert_allclose(paths[1]["q"], paths[0]["q"], atol=3e-3)
+    assert_allclose(paths[1]["q"], paths[0]["q"], atol=1e-3)
+    # MuJoCo leaves the tool where it was before the tick.
+    assert_allclose(paths[1]["position"][:-1], paths[0]["position"][1:], atol=2e-4)
 
 
 def test_the_board_pushes_back_as_hard_as_the_arm_presses():
@@ -85,7 +87,7 @@ def test_the_board_pushes_back_as_hard_as_the_arm_presses():
         row = run(worlds, 1200)[0][-1]
         dynamics = panda().dynamics(row["q"], np.zeros(7))
         assert_allclose(row["torque"] - dynamics["g"] + dynamics["J"].T @ row["wrench_ee"], 0.0, atol=0.01)
-        assert_allclose(row["tool_force"], row["wrench_ee"][:3], atol=1e-6)
+        assert_allclose(row["tool_force"], row["wrench_ee"][:3], atol=1e-4)
         assert_allclose(row["residual"], 0.0, atol=0.01)
         assert_allclose(row["tau_arm"], 0.0, atol=1e-6)
         forces.append(row["tool_force"][2])
@@ -123,18 +125,20 @@ def test_ink_goes_where_the_pad_is_pressed_only():
 
 
 def test_any_part_but_the_pad_on_the_table_is_told():
-    worlds = worlds_at((0.5, 0.0, 0.1), engine=BulletWorlds)
+    worlds = worlds_at((0.5, 0.0, BOARD_Z - 0.0005), engine=BulletWorlds)
+    run(worlds, 17)
+    assert worlds.reports[0]["contact_ticks"] > 0
+    assert worlds.reports[0]["arm_touched"] == 0
     worlds.reset(0, np.array([0.0, 1.55, 0.0, -0.6, 0.0, 2.6, 0.8]))  # on its elbow
     worlds.controllers[0]["target"]["position"][2] -= 0.2
-    run(worlds, 17)
-    assert worlds.reports[0]["arm_touched"] == 0
-    run(worlds, 1000)
+    run(worlds, 510)
     assert worlds.reports[0]["arm_touched"] == 1
+    assert worlds.reports[0]["contact_ticks"] == 0
 
 
 def test_a_push_on_a_link_is_felt_by_the_observer():
     worlds = worlds_at((0.5, 0.0, 0.15), engine=BulletWorlds)
-    worlds.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 8.0, 0.0), 0.0, 1.0)
+    worlds.push(0, "link5", (0.0, 0.0, 0.0), (0.0, 15.0, 0.0), 0.0, 1.0)
     trace = run(worlds, 100)[0]
     assert np.abs(trace["tau_arm"][-1]).max() > 2.0
     assert_allclose(trace["residual_trigger"][-1], trace["tau_arm"][-1], atol=0.25 * np.abs(trace["tau_arm"][-1]).max())

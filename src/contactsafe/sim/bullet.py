@@ -1,8 +1,8 @@
 """One arm before one whiteboard in PyBullet: a second engine, from the same facts through the URDF.
 
 Bullet knows no rotor inertia at a joint, so the rotors are there themselves: small flywheels on the link before each
-joint, geared to it. At 100 : 1 a motor's torque accelerates the arm as in the MJCF to 1 %; what is left over is the
-share of 1 : 100 of its link's turning that a spinning rotor does feel. Gravity and link inertia are the MJCF's to 1e-9.
+joint, geared to it so high that they hardly feel the link's own turning. A motor's torque then accelerates the arm as in
+the MJCF to 0.3 %; gravity and the links' inertia are the MJCF's to 1e-9.
 """
 
 import tempfile
@@ -22,7 +22,7 @@ from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import BOARD_HALF_THICKNESS, TABLE_HALF_SIZE, loaded, perturbed
 
-GEAR = 100.0
+GEAR = 1000.0
 """Turns of a rotor for one of its joint."""
 
 _ROTOR_KG = 1e-6  # the links' masses of Gaz et al. contain the motors
