@@ -1,8 +1,8 @@
 """One arm before one whiteboard in PyBullet: a second engine, from the same facts through the URDF.
 
 Bullet knows no rotor inertia at a joint, so the rotors are there themselves: small flywheels on the link before each
-joint, geared to it so high that they hardly feel the link's own turning. A motor's torque then accelerates the arm as in
-the MJCF to 0.3 %; gravity and the links' inertia are the MJCF's to 1e-9.
+joint, geared to it so high that they hardly feel the link's own turning. A motor's torque then accelerates the arm as
+in the MJCF to 0.4 %; gravity and the links' inertia are the MJCF's to 1e-9.
 """
 
 import tempfile
@@ -31,7 +31,7 @@ _ROTOR_KG = 1e-6  # the links' masses of Gaz et al. contain the motors
 # weighs along the board's normal, is 0.4 · 2 √(4 · 4800 · 7) / 4.
 _PAD_N_M, _PAD_NS_M = 4800.0, 73.0
 
-_ITERATIONS = 20  # of the solver: against 400, wiping at 10 N differs by 1 µm and 0.04 N at most
+_ITERATIONS = 20  # of the solver: against 400, wiping at 10 N differs by 1 µm and 0.05 N at most
 
 MAX_CONTACTS = 32
 
