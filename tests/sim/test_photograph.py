@@ -67,9 +67,9 @@ def test_ink_in_photographs_is_found_where_it_is(studio, kind):
         found, there = studio.masks(seed, seed / 39)
         both, either = both + (found & there).sum(), either + (found | there).sum()
         found_all, there_all = found_all + found.sum(), there_all + there.sum()
-    assert both / either > 0.80
-    assert both / there_all > 0.90
-    assert both / found_all > 0.86
+    assert both / either > 0.85
+    assert both / there_all > 0.93
+    assert both / found_all > 0.89
 
 
 @pytest.mark.slow
@@ -80,24 +80,25 @@ def test_nothing_is_found_on_an_empty_board(studio):
     for seed in range(60):
         studio.place(anywhere(np.random.default_rng(seed)))
         false.append(studio.masks(seed, seed / 59)[0].sum())
-    assert np.mean(false) < 0.5, false
-    assert np.max(false) < 15, false
+    assert np.sum(false) <= 5, false
 
 
-def test_small_specks_are_found(studio):
-    """What a wipe leaves: specks of 6 mm and more in fair light; the arm is away."""
+@pytest.mark.parametrize("severity", [0.0, 0.5, 1.0])
+def test_the_last_specks_are_found(studio, severity):
+    """Two cells square, 4 mm: one and a half of the mask's pixels. One cell alone is a pixel of the photograph's."""
     studio.place(AWAY)
-    found_all, specks = 0, 0
+    found, specks = 0, 0
     for seed in range(10):
-        rng = np.random.default_rng(seed)
         studio.board.clear()
-        for i, j in rng.integers(60, 190, (6, 2)):
-            studio.board.cells[i : i + 3, j + 25 : j + 28] = INK
-        found, there = studio.masks(seed, 0.5)
-        near = np.pad(found, 1)
-        seen = np.any([near[a : a + 128, b : b + 128] for a in range(3) for b in range(3)], axis=0)
-        found_all, specks = found_all + (seen & there).sum(), specks + there.sum()
-    assert found_all / specks > 0.9
+        corners = np.random.default_rng(seed).integers((60, 85), (190, 215), (6, 2))
+        for i, j in corners:
+            studio.board.cells[i : i + 2, j : j + 2] = INK
+        ink = studio.masks(seed, severity)[0]
+        for corner in corners:
+            u, v, w = studio.worlds.homography @ [*(studio.board.origin + (corner + 1) * CALM.board.cell), 1.0]
+            u, v = int(u / w), int(v / w)
+            found, specks = found + ink[v - 1 : v + 2, u - 1 : u + 2].any(), specks + 1
+    assert found / specks >= 0.95
 
 
 def test_a_dark_object_is_taken_for_ink(studio):
@@ -107,7 +108,7 @@ def test_a_dark_object_is_taken_for_ink(studio):
     studio.board.place_object((0.5, 0.05), (0.06, 0.06))
     for seed in range(5):
         found, there = studio.masks(seed, 0.5)
-        assert (found & there).sum() / (found | there).sum() > 0.7
+        assert (found & there).sum() / (found | there).sum() > 0.85
 
 
 def test_what_kinematics_hide_is_what_the_mask_hides(studio):
@@ -120,7 +121,7 @@ def test_what_kinematics_hide_is_what_the_mask_hides(studio):
         hidden = free & (studio.worlds.render()[0] != 0)
         middles = ((np.arange(128) + 0.5) * PHOTO_PX / 128).astype(int)
         ours = free & (studio.photographer.hidden(studio.solids)[np.ix_(middles, middles)] > 0)
-        assert (ours & hidden).sum() / (ours | hidden).sum() > 0.95
+        assert (ours & hidden).sum() / (ours | hidden).sum() > 0.98
 
 
 def test_the_homography_is_the_masks_scaled(studio):

@@ -38,7 +38,7 @@ def written(picture, darkness=0.8, thickness=7):
 
 
 def expected(where):
-    return cv2.resize(where, (128, 128), interpolation=cv2.INTER_AREA) > 255 * 0.15
+    return cv2.resize(where, (128, 128), interpolation=cv2.INTER_AREA) > 255 * 0.10
 
 
 def agreement(mask, where):

@@ -234,7 +234,7 @@ class Photographer:
     def _cover(self, scene: _Scene, where: np.ndarray) -> np.ndarray:
         """Share of each pixel that something on the board covers, (n, n) uint8."""
         H = _TO_MIDDLES @ scene.homography @ self._cells_to_board
-        covered = cv2.GaussianBlur(np.where(where, np.uint8(255), np.uint8(0)), (3, 3), 0)
+        covered = np.where(where, np.uint8(255), np.uint8(0))
         return cv2.warpPerspective(covered, H, (PHOTO_PX, PHOTO_PX), flags=cv2.INTER_LINEAR)
 
     def _shadow(self, scene: _Scene, solids: Solids) -> np.ndarray:

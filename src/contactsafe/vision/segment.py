@@ -9,8 +9,8 @@ from contactsafe.vision.silhouette import fill, on_plane
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
 _COARSE = 4  # photograph's pixels along an edge of one of the background's
-_WINDOW = 9  # of the background's pixels: strokes and blobs must be narrower, shadows wider
-_DEEPEST = 0.35  # share of the board's brightness that is left in the darkest shadow
+_WINDOW = 5  # of the background's pixels: strokes and blobs must be narrower, shadows wider
+_DEEPEST = 0.20  # share of the board's brightness that is left in the darkest shadow
 
 
 class Segmenter:
@@ -43,10 +43,10 @@ class Segmenter:
         photo_size: int = 455,
         mask_size: int = 128,
         faint: float = 0.15,
-        clear: float = 0.28,
+        clear: float = 0.20,
         sharp: float = 0.12,
-        least_px: int = 4,
-        share: float = 0.15,
+        least_px: int = 3,
+        share: float = 0.10,
         rim_px: int = 3,
     ):
         homography, corners = np.asarray(homography, dtype=float), np.asarray(corners, dtype=float)
