@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 
 from stable_baselines3 import TD3  # noqa: E402
 from stable_baselines3.common.noise import NormalActionNoise  # noqa: E402
-from tests.learning.fakes import FakeWiping  # noqa: E402
+from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
 from contactsafe.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import ALGORITHMS, PpoConfig, SacConfig  # noqa: E402
@@ -83,6 +83,17 @@ def test_the_bundle_acts_as_the_model_does(config, vae, tmp_path, monkeypatch):
     state = np.concatenate([seen[name] for name in observes], axis=1)
     found = bundle.policy.run(None, {"state": state, "latent": latent})[0]
     np.testing.assert_allclose(found, wanted, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_sac_learns_to_go_where_the_ink_is(vae, tmp_path):
+    config = SacConfig(
+        vae=vae, out=tmp_path / "run", total_steps=6144, rollout_steps=32, batch=128, net=(64, 64), learning_rate=2e-3,
+        learning_starts=1000, buffer=20_000, discount=0.95, pose_scale=(0.15, 0.15, 0.03, 0.05, 0.05, 0.1),
+        evaluate_episodes=16,
+    )  # fmt: skip
+    results = train_policy(config, lambda n: SightedWiping(n, max_steps=40))
+    assert results["ink_removed_mean"] > 0.8
 
 
 def test_the_learning_rate_falls_with_absolute_steps():

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.train
 torch = pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from tests.learning.fakes import BOARD, FakeWiping  # noqa: E402
+from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
 from contactsafe.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
@@ -176,19 +176,10 @@ def test_without_an_encoder_it_says_what_to_do(tmp_path):
 
 def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
     """With the ink's place readable off the observation, a few thousand steps must pay."""
-
-    class Sighted(FakeWiping):
-        def _observe(self):
-            seen = super()._observe()
-            for i, board in enumerate(self.boards):
-                nearest = board.points[np.abs(board.points - self.xy[i]).sum(axis=1).argmin()] if board.left else BOARD
-                seen["pose"][i, 3:5] = nearest - self.xy[i]
-            return seen
-
     config = ppo_config(
         vae, tmp_path / "run", num_envs=16, total_steps=12_288, rollout_steps=32, batch=128, epochs=6,
         learning_rate=2e-3, net=(64, 64), target_kl=0.05, pose_scale=(0.15, 0.15, 0.03, 0.05, 0.05, 0.1),
         discount=0.95, evaluate_episodes=16,
     )  # fmt: skip
-    results = train_policy(config, lambda n: Sighted(n, max_steps=40))
+    results = train_policy(config, lambda n: SightedWiping(n, max_steps=40))
     assert results["ink_removed_mean"] > 0.6
