@@ -29,6 +29,7 @@ DESCRIPTION = {
     "observes": ["pose"],
     "rate_hz": 60.0,
     "action_repeat": 1,
+    "scan": {"amplitude": 0.0},
     "training": {},
     "results": {},
 }
@@ -155,6 +156,23 @@ def test_what_is_observed_besides_the_picture_is_asked_for(tmp_path):
     with pytest.raises(InvalidInputError) as error:
         policy.act(seen)
     assert str(error.value) == "observation has no force; this policy observes pose, target, force"
+
+
+def test_the_motion_laid_over_the_actions_is_the_episodes_own(tmp_path):
+    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
+    rewrite(folder, scan={"amplitude": 0.25, "period_s": 1.0})
+    still, policy, seen = Policy(foveated_bundle(tmp_path / "still", ["pose"]), H), Policy(folder, H), observations(2)
+    free = np.abs(still.act(seen)[:, :2]) < 0.75
+    offsets = []
+    for _ in range(60):
+        offsets.append(policy.act(seen) - still.act(seen))
+    policy.begin(1)
+    assert not np.array(offsets)[:, :, 2:].any()
+    assert 0.2 < np.abs(np.array(offsets)[:, :, :2][:, free]).max() <= 0.2501
+    again = policy.act(seen) - still.act(seen)
+    np.testing.assert_array_equal(again[1], offsets[0][1])
+    rewrite(folder, scan={"amplitude": 2.0})
+    assert refusal(folder) == f"{folder}/bundle.json: scan is {{'amplitude': 2.0}}; export the bundle anew"
 
 
 def test_missing(bundle):

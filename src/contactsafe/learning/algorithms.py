@@ -42,7 +42,7 @@ class PpoConfig(PolicyConfig):
     max_grad_norm: float = 0.5
     target_kl: float = 0.03
     log_std_init: float = -1.0
-    log_std_final: float = -2.5
+    log_std_final: float = -1.7
 
     def make_model(self, env):
         """Make an untrained PPO."""

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
-from contactsafe.errors import BundleError
+from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
+from contactsafe.learning.scan import Scan
 
 FORMAT = 2
 """Version of the folder's layout; raised when an older reader would misread it."""
@@ -47,6 +48,7 @@ FIELDS = {
     "observes": list,
     "rate_hz": float,
     "action_repeat": int,
+    "scan": dict,
     "actions": list,
     "observation_scaling": dict,
     "files": dict,
@@ -116,6 +118,11 @@ class Bundle:
         return cls(folder, manifest, encoder, policy)
 
     @property
+    def scan(self):
+        """The motion laid over its actions."""
+        return Scan(**self.manifest["scan"])
+
+    @property
     def rate_hz(self):
         """Observations a second the policy was trained at."""
         return float(self.manifest["rate_hz"])
@@ -154,6 +161,10 @@ def _read_manifest(folder):
     if manifest["representation"] not in REPRESENTATIONS:
         allowed = ", ".join(REPRESENTATIONS)
         raise BundleError(f"{path}: representation is {manifest['representation']!r}, not one of {allowed}")
+    try:
+        Scan(**manifest["scan"])
+    except (TypeError, InvalidInputError) as error:
+        raise BundleError(f"{path}: scan is {manifest['scan']!r}; export the bundle anew") from error
     observes = manifest["observes"]
     if not all(isinstance(name, str) and name in OBSERVED for name in observes) or len(set(observes)) < len(observes):
         raise BundleError(f"{path}: observes is {observes!r}, not some of {', '.join(OBSERVED)}; export it anew")

@@ -8,7 +8,10 @@ from contactsafe.learning.perception import Perception
 
 
 class Policy:
-    """The deterministic policy of a bundle: the mean of what was trained.
+    """The policy of a bundle: the mean of what was trained, and the motion laid over it, which knows the time.
+
+    `begin` starts an episode; without it the motion goes on from where it is, which does no harm. For a batch, row i of
+    an observation belongs to episode i.
 
     Args:
         bundle: a Bundle, or the path of one.
@@ -27,6 +30,7 @@ class Policy:
         self.action_repeat = self.bundle.action_repeat
         self.rate_hz = self.bundle.rate_hz
         self._observes = manifest["observes"]
+        self._scan, self._steps = self.bundle.scan, np.zeros(1, int)
         self._perceive = Perception(
             self.bundle.encoder, manifest["representation"], manifest["window_m"], manifest["view_size"], homography
         )
@@ -39,6 +43,12 @@ class Policy:
             except Exception as error:
                 reason = str(error).splitlines()[0][:160]
                 raise BundleError(f"{self.bundle.folder} loads but does not run ({reason}); export it anew") from error
+        self._steps[:] = 0
+
+    def begin(self, i=0):
+        """Begin episode i."""
+        if i < len(self._steps):
+            self._steps[i] = 0
 
     def act(self, observation):
         """Choose the action.
@@ -49,7 +59,7 @@ class Policy:
                 mask: (128, 128, 1) or (N, 128, 128, 1) uint8, ink 0.
 
         Returns:
-            Action, (18,) or (N, 18) float32 in [-1, 1]; the same for the same observation.
+            Action, (18,) or (N, 18) float32 in [-1, 1]; the same for the same observation at the same step.
 
         Raises:
             InvalidInputError: something the policy observes is missing, has another shape or type, or is not finite.
@@ -63,6 +73,10 @@ class Policy:
         action = self.bundle.policy.run(["action"], {"state": state, "latent": latent})[0]
         if action.shape != (len(pose), len(ACTIONS)) or not np.all(np.isfinite(action)):
             raise BundleError(f"{self.bundle.folder} gave an action that is not 18 finite numbers; do not run it")
+        if len(self._steps) != len(action):
+            self._steps = np.zeros(len(action), int)
+        action = self._scan.over(action, self._steps)
+        self._steps += 1
         return action[0] if single else action
 
     def _vector(self, observation, name, single, n):

@@ -44,6 +44,7 @@ class PolicyConfig:
         discount: the paper's γ of RL, for one environment step; raised to action_repeat.
         net: widths of the hidden layers, of policy and of value network.
         action_repeat: environment steps for which one action is given.
+        scan: amplitude of the steady motion laid over the actions, in training and ever after; 0 for none.
         reward_scale: rewards are multiplied by this before learning; logs are not.
         observes: what the policy takes besides the picture: pose (the paper's), target (x_d, K1 and D1 as they are
             now) and force; without the latter two it can neither know how stiff it is nor feel what it touches.
@@ -70,6 +71,7 @@ class PolicyConfig:
     discount: float = 0.995
     net: tuple[int, ...] = (256, 128)
     action_repeat: int = 1
+    scan: float = 0.3
     reward_scale: float = 1.0
     observes: tuple[str, ...] = ("pose", "target", "force")
     rate_hz: float = 60.0

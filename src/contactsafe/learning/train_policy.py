@@ -1,7 +1,7 @@
 """Train a policy on [pose, latent] with any algorithm of Stable-Baselines3, the free-space controller underneath."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import gymnasium
 import torch
@@ -18,6 +18,7 @@ from contactsafe.learning.perception import LEARNED, Perception, open_session
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.recorder import Curves, Recorder
 from contactsafe.learning.run import Run, load_run
+from contactsafe.learning.scan import Scan
 from contactsafe.learning.vec_env import EncodedVecEnv
 
 
@@ -88,7 +89,8 @@ def _encoded(raw_env, eyes, config):
     view = (vae["representation"], vae["window_m"], vae["size"])
     perception = Perception(session, *view, _homography(raw_env))
     scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
-    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale)
+    scan = Scan(config.scan, rate_hz=config.rate_hz)
+    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, scan)
 
 
 def _homography(env):
@@ -118,6 +120,7 @@ def _describe(config, eyes, effort):
         "observes": list(config.observes),
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
+        "scan": asdict(Scan(config.scan, rate_hz=config.rate_hz)),
         "training": {
             config.algorithm: _portable(plain(config)),
             "vae": {

@@ -9,7 +9,10 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import step_values
+from contactsafe.learning.scan import Scan
 from contactsafe.sim.snapshot import Part, of_array, of_object, put, take
+
+_STILL = Scan(amplitude=0.0)
 
 
 class EncodedVecEnv(VecEnv):
@@ -24,6 +27,7 @@ class EncodedVecEnv(VecEnv):
         scaling: the ObservationScaling.
         action_repeat: environment steps for which one action is given; their rewards are summed.
         reward_scale: rewards are multiplied by this; the metrics are not.
+        scan: motion laid over the actions.
 
     Attributes:
         finished: metrics of the last 100 episodes, a dict each: return, steps, success, ink_left, force_mean_n,
@@ -33,7 +37,7 @@ class EncodedVecEnv(VecEnv):
         InvalidInputError: the environment resets in another mode, or action_repeat is below 1.
     """
 
-    def __init__(self, env, perception, scaling, action_repeat=1, reward_scale=1.0):
+    def __init__(self, env, perception, scaling, action_repeat=1, reward_scale=1.0, scan=_STILL):
         if env.metadata.get("autoreset_mode") != AutoresetMode.SAME_STEP:
             raise InvalidInputError(
                 f"the environment resets by {env.metadata.get('autoreset_mode')}; make it with AutoresetMode.SAME_STEP"
@@ -45,6 +49,7 @@ class EncodedVecEnv(VecEnv):
         self.scaling = scaling
         self.action_repeat = action_repeat
         self.reward_scale = reward_scale
+        self.scan = scan
         self.finished: deque[dict] = deque(maxlen=100)
         box = gymnasium.spaces.Box(-scaling.clip, scaling.clip, (len(scaling.centre),), np.float32)
         super().__init__(env.num_envs, box, env.single_action_space)
@@ -81,7 +86,7 @@ class EncodedVecEnv(VecEnv):
         infos: list[dict] = [{} for _ in range(self.num_envs)]
         actions = self._actions
         for _ in range(self.action_repeat):
-            observation, reward, terminated, truncated, info = self.env.step(actions)
+            observation, reward, terminated, truncated, info = self.env.step(self.scan.over(actions, self._steps))
             done = np.asarray(terminated) | np.asarray(truncated)
             # What the next episode earns while the others finish their repeats belongs to neither transition.
             rewards[~ended] += np.asarray(reward)[~ended]

@@ -1,0 +1,54 @@
+"""A small steady motion over the board, laid over what a policy asks for, as a hand makes when it wipes.
+
+The mean of a policy that has learned with noise can stand still between two patches of ink, where each draws as much as
+the other, or before one that the hand hides and uncovers. Noise had always carried it on; without, it stays for ever. A
+motion that never rests does the same, and the same again for the same episode. Its two periods have the golden ratio,
+so that it does not repeat itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactsafe.errors import InvalidInputError
+
+_GOLDEN = (1.0 + 5.0**0.5) / 2.0
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The motion.
+
+    Attributes:
+        amplitude: along x and along y, as a share of the largest action; 0 for none.
+        period_s: along x, s.
+        rate_hz: of actions.
+    """
+
+    amplitude: float = 0.3
+    period_s: float = 2.0
+    rate_hz: float = 60.0
+
+    def __post_init__(self):
+        """Refuse a motion that is none."""
+        if not (0.0 <= self.amplitude <= 1.0 and 0.1 <= self.period_s <= 60.0 and 0.1 <= self.rate_hz <= 1000.0):
+            raise InvalidInputError(
+                f"scan amplitude = {self.amplitude}, period_s = {self.period_s}, rate_hz = {self.rate_hz}; "
+                "give 0 ≤ amplitude ≤ 1, 0.1 ≤ period_s ≤ 60 and 0.1 ≤ rate_hz ≤ 1000"
+            )
+
+    def over(self, actions, steps):
+        """Lay the motion over actions.
+
+        Args:
+            actions: (N, 18).
+            steps: taken in each episode so far, (N,).
+
+        Returns:
+            (N, 18) float32, clipped to [-1, 1].
+        """
+        phase = 2.0 * np.pi * np.asarray(steps) / (self.period_s * self.rate_hz)
+        moved = np.array(actions, dtype=np.float32)
+        moved[:, 0] += self.amplitude * np.cos(phase)
+        moved[:, 1] += self.amplitude * np.sin(_GOLDEN * phase)
+        return np.clip(moved, -1.0, 1.0)
