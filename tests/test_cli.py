@@ -122,14 +122,13 @@ def test_a_missing_bundle_is_told(command, tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["policy.onnx", "encoder.onnx"])
-def test_a_damaged_bundle_is_told_and_nothing_is_written(name, bundle, tmp_path, capsys):
-    data = bytearray((bundle / name).read_bytes())
+def test_a_damaged_bundle_is_told_and_nothing_is_written(bundle, tmp_path, capsys):
+    data = bytearray((bundle / "policy.onnx").read_bytes())
     data[len(data) // 2] ^= 1
-    (bundle / name).write_bytes(data)
+    (bundle / "policy.onnx").write_bytes(data)
     told = mistake(capsys, "demo", "--bundle", str(bundle), "--out", str(tmp_path / "out"))
     assert told == (
-        f"{bundle / name} is not the file bundle.json was written for (size or SHA-256 differ); "
+        f"{bundle / 'policy.onnx'} is not the file bundle.json was written for (size or SHA-256 differ); "
         "copy or export the bundle anew"
     )
     assert not (tmp_path / "out").exists()

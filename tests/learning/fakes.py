@@ -199,5 +199,5 @@ class SightedWiping(FakeWiping):
         seen = super()._observe()
         for i, board in enumerate(self.boards):
             nearest = board.points[np.abs(board.points - self.xy[i]).sum(axis=1).argmin()] if board.left else BOARD
-            seen["pose"][i, 3:5] = nearest - self.xy[i]
+            seen["pose"][i, 3:5] = 2.0 * (nearest - self.xy[i])
         return seen

@@ -88,9 +88,9 @@ def test_the_bundle_acts_as_the_model_does(config, vae, tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_sac_learns_to_go_where_the_ink_is(vae, tmp_path):
     config = SacConfig(
-        vae=vae, out=tmp_path / "run", total_steps=6144, rollout_steps=32, batch=128, net=(64, 64), learning_rate=2e-3,
-        learning_starts=1000, buffer=20_000, discount=0.95, pose_scale=(0.15, 0.15, 0.03, 0.05, 0.05, 0.1),
-        evaluate_episodes=16,
+        vae=vae, out=tmp_path / "run", num_envs=16, total_steps=6144, rollout_steps=32, batch=128, net=(64, 64),
+        learning_rate=2e-3, learning_starts=1000, buffer=20_000, discount=0.95,
+        evaluate_episodes=16, scan=0.0, observes=("pose",),
     )  # fmt: skip
     results = train_policy(config, lambda n: SightedWiping(n, max_steps=40))
     assert results["ink_removed_mean"] > 0.8
