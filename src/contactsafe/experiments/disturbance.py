@@ -67,7 +67,7 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
-    config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS))
+    config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS, press=_PRESS))
     arm = robots.panda()
     worlds = [WorldConfig(plant=draw_plant(scene_rng(seed, 0), arm.n), sensors=REAL_SENSORS) for seed in seeds]
     tasks = WipingTasks(config, len(seeds), list(seeds), worlds)
