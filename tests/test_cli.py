@@ -134,6 +134,24 @@ def test_a_damaged_bundle_is_told_and_nothing_is_written(bundle, tmp_path, capsy
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ("--boards runes", "boards = 'runes'; choose strokes, digits, text or handwriting"),
+        ("--sight dream", "sight = 'dream'; choose mask or photograph"),
+        ("--engine steam", "engine = 'steam'; choose mujoco or pybullet"),
+        ("--reference oracle", "reference 'oracle' is unknown; choose one of raster, nearest-ink, random"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_told(options, told, capsys):
+    assert mistake(capsys, "evaluate", "--episodes", "1", *options.split()) == told
+
+
+def test_a_bundle_and_a_reference_are_one_too_many(bundle, capsys):
+    told = mistake(capsys, "evaluate", str(bundle), "--reference", "raster")
+    assert told == "a bundle and --reference raster are both given; name one"
+
+
 def test_a_bundle_that_is_not_whole_is_told(bundle, capsys):
     (bundle / "policy.onnx").unlink()
     told = mistake(capsys, "evaluate", str(bundle))

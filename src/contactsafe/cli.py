@@ -134,7 +134,7 @@ def evaluate(
         sight: the ink as it is (mask), or as segmentation finds it in photographs (photograph).
         engine: mujoco or pybullet.
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
-        randomised: every board another plant, pad, camera and light, as in training.
+        randomised: every board another height, tilt, pad, camera and plant, as in training.
         reference: a script in place of the policy: raster, nearest-ink or random.
         json: print JSON instead of a table.
     """

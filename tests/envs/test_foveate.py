@@ -8,6 +8,8 @@ from tests.learning.fakes import BOARD, camera_homography
 
 from contactsafe.envs.foveate import FEATURES, RINGS, SCALES_M, SECTORS, foveate, ground_of
 from contactsafe.errors import InvalidInputError
+from contactsafe.sim.camera import plane_homography
+from contactsafe.sim.config import Camera
 
 H = camera_homography()
 GROUND = ground_of(H, (128, 128))
@@ -67,6 +69,17 @@ def test_more_ink_is_more(tool):
     little, much = mask_of((0.05, 0.05)), mask_of((0.05, 0.05), (-0.05, 0.1), (0.1, -0.1))
     assert (look(much, tool)[:GRID] >= look(little, tool)[:GRID]).all()
     assert look(much, tool)[-1] > look(little, tool)[-1]
+
+
+@given(places, places)
+def test_another_camera_sees_ink_in_the_same_place(speck, tool):
+    """One that stands to the side and nearer, with its own calibration."""
+    aside = plane_homography(Camera(position=(0.8, -0.6, 0.6)), 0.01)
+    u, v, w = aside @ [*(BOARD + speck), 1.0]
+    mask = np.full((1, 128, 128), 255, np.uint8)
+    mask[0, int(v / w), int(u / w)] = 0
+    other = foveate(mask, (BOARD + tool)[None], ground_of(aside, (128, 128)))[0]
+    assert np.linalg.norm(soft_nearest(other, 0) - soft_nearest(look(mask_of(speck), tool), 0)) < 0.01
 
 
 def test_area_of_a_pixel_is_that_of_its_outline_on_the_board():

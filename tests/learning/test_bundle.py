@@ -13,8 +13,9 @@ onnx = pytest.importorskip("onnx")
 from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 
 from contactsafe.envs.foveate import FEATURES  # noqa: E402
+from contactsafe.envs.tasks import OBSERVED  # noqa: E402
 from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
-from contactsafe.learning.bundle import OBSERVED, Bundle, digest  # noqa: E402
+from contactsafe.learning.bundle import Bundle, digest  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
 from contactsafe.learning.observation import ObservationScaling  # noqa: E402
@@ -139,7 +140,7 @@ def foveated_bundle(folder, observes):
     return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **eyes})
 
 
-def test_foveated_needs_no_encoder_and_sees_the_same_from_any_camera(tmp_path):
+def test_foveated_needs_no_encoder_and_the_scale_of_a_homography_says_nothing(tmp_path):
     folder = foveated_bundle(tmp_path / "bundle", ["pose"])
     assert sorted(path.name for path in folder.iterdir()) == ["bundle.json", "policy.onnx"]
     np.testing.assert_allclose(

@@ -17,6 +17,7 @@ from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
 from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
 from contactsafe.learning.observation import ObservationScaling  # noqa: E402
+from contactsafe.learning.scan import Scan  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.vec_env import EncodedVecEnv  # noqa: E402
 
@@ -106,6 +107,29 @@ def test_reward_scale_scales_rewards_and_not_the_log():
     for _ in range(5):
         np.testing.assert_allclose(scaled.step(action)[1], 0.1 * plain.step(action)[1], rtol=1e-5)
     assert plain.finished[0]["return"] == pytest.approx(scaled.finished[0]["return"])
+
+
+def test_the_scan_is_laid_over_the_actions_by_the_step_of_each_episode():
+    scan = Scan(amplitude=0.5, period_s=0.1)
+    env, adapter = make_adapter(scan=scan)
+    adapter.reset()
+    taken, step = [], env.step
+    env.step = lambda actions: (taken.append(np.array(actions)), step(actions))[1]
+    for _ in range(7):
+        adapter.step(np.zeros((3, 18), np.float32))
+    still = np.zeros((3, 18))
+    for k, actions in enumerate(taken):
+        np.testing.assert_allclose(actions, scan.over(still, np.full(3, k % 5)), atol=1e-6)
+
+
+def test_exploration_falls_with_the_steps_done(vae, tmp_path):
+    config = ppo_config(vae, tmp_path / "run", total_steps=1000, batch=48, log_std_init=-1.0, log_std_final=-2.0)
+    _, adapter = make_adapter()
+    model = config.make_model(adapter)
+    for steps, wanted in ((0, -1.0), (500, -1.5), (1000, -2.0), (1500, -2.0)):
+        model.num_timesteps = steps
+        config.prepare_rollout(model)
+        assert model.policy.log_std.detach().numpy() == pytest.approx(np.full(18, wanted))
 
 
 def test_what_the_adapter_refuses():

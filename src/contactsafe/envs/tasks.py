@@ -22,6 +22,9 @@ from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 
 ACTION_SIZE = 18
 
+OBSERVED = {"pose": 6, "target": 18, "force": 3}
+"""What a policy may observe besides the mask, and how many numbers each; `WipingEnv` says what they are."""
+
 
 def _sight(config: WipingConfig, worlds: Worlds):
     """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
@@ -193,7 +196,7 @@ class WipingTasks:
     def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
         """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
         return {
-            **{name: self.tasks[name][i].astype(np.float32) for name in ("pose", "target", "force")},
+            **{name: self.tasks[name][i].astype(np.float32) for name in OBSERVED},
             "mask": self.worlds.masks[i][..., None].copy(),
         }
 

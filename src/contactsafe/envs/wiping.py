@@ -9,20 +9,17 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
+from contactsafe.envs.tasks import ACTION_SIZE, OBSERVED, WipingTasks
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
 from contactsafe.sim.world import POLICY_RATE_HZ
-
-VECTORS = {"pose": 6, "target": 18, "force": 3}
-"""What a policy observes besides the mask, and how many numbers each."""
 
 
 def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
     size = config.world.camera.size
     observation = gymnasium.spaces.Dict(
         {
-            **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in VECTORS.items()},
+            **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in OBSERVED.items()},
             "mask": gymnasium.spaces.Box(0, 255, (size, size, 1), np.uint8),
         }
     )

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
+from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
 from contactsafe.learning.scan import Scan
@@ -25,9 +26,6 @@ MANIFEST = "bundle.json"
 ENCODER, POLICY = "encoder.onnx", "policy.onnx"
 MAX_MANIFEST_BYTES = 1_000_000
 MAX_MODEL_BYTES = 16_000_000
-
-OBSERVED = {"pose": 6, "target": 18, "force": 3}
-"""What a policy may take besides the latent, and how many numbers each."""
 
 MAX_LATENT = 4096
 

@@ -12,8 +12,9 @@ import onnx
 import torch
 from torch import nn
 
+from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, ContactSafeError, OutputError
-from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, OBSERVED, POLICY, Bundle, digest
+from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
 from contactsafe.learning.checkpoints import write_atomically, write_json
 from contactsafe.learning.encoder import MaskEncoder
 from contactsafe.learning.perception import open_session
