@@ -24,6 +24,7 @@ class BulletTasks(WipingTasks):
             worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, self._rewards[0],
             self.tasks, worlds.masks,
         )  # fmt: skip
+        worlds.in_threads(self._look)
 
 
 @compiled(nogil=True)

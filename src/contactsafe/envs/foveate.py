@@ -13,6 +13,9 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.envs.rectify import INK_BELOW
 from contactsafe.errors import InvalidInputError
+from contactsafe.vision.words import WORD, words_of
+
+_BARE = np.uint64(2**64 - 1)  # eight pixels without ink
 
 RINGS = 10
 SECTORS = 16
@@ -123,11 +126,15 @@ def _foveate_one(mask, tool_x, tool_y, place, area, out):
     pixels = np.empty(mask.shape[0], dtype=np.int32)
     count = 0
     nearest = math.inf
-    for p in range(mask.shape[0]):
-        if mask[p] < INK_BELOW and area[p] > 0.0:
-            pixels[count] = p
-            count += 1
-            nearest = min(nearest, (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2)
+    words = words_of(mask)
+    for w in range(words.shape[0] + 1):
+        if w < words.shape[0] and words[w] == _BARE:
+            continue
+        for p in range(WORD * w, min(WORD * (w + 1), mask.shape[0])):
+            if mask[p] < INK_BELOW and area[p] > 0.0:
+                pixels[count] = p
+                count += 1
+                nearest = min(nearest, (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2)
     if count == 0:
         return
     nearest = math.sqrt(nearest)

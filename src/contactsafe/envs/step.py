@@ -8,7 +8,8 @@ from contactsafe.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose, observed_target
 from contactsafe.sim.camera import camera_at, render_mask
 from contactsafe.sim.stepping import run_ticks, tool_position
-from contactsafe.sim.whiteboard import INK, row_is_bare
+from contactsafe.sim.whiteboard import INK
+from contactsafe.vision.words import WORD, words_of
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
 
@@ -53,14 +54,20 @@ def nearest_ink(cells, origin, cell, position):
     count = 0
     best = math.inf
     px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
-    for i in range(cells.shape[0]):
-        if row_is_bare(cells, i):
+    columns = cells.shape[1]
+    flat = cells.reshape(-1)
+    words = words_of(flat)
+    for w in range(words.shape[0] + 1):
+        if w < words.shape[0] and words[w] == 0:
             continue
-        for j in range(cells.shape[1]):
-            if cells[i, j] == INK:
+        i, j = WORD * w // columns, WORD * w % columns
+        for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
+            if flat[p] == INK:
                 count += 1
-                d = (i - px) * (i - px) + (j - py) * (j - py)
-                best = min(best, d)
+                best = min(best, (i - px) * (i - px) + (j - py) * (j - py))
+            j += 1
+            if j == columns:
+                i, j = i + 1, 0
     if count == 0:
         return 0, 0.0
     return count, math.sqrt(best) * cell

@@ -175,23 +175,28 @@ class WipingTasks:
             self._pusher.step()
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
         self._advance(ticks, worlds.no_trace if traces is None else traces)
-        sight = self._sight
-        if sight is not None:
-            worlds.in_threads(lambda start, stop: sight.look(start, stop, self.tasks))
-        if self._variation is not None:
-            worlds.in_threads(self._variation.look)
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
-        """Run one policy step of so many ticks, (n,), under `self._actions`."""
+        """Run one policy step of so many ticks, (n,), under `self._actions`, and look."""
         worlds, arm = self.worlds, self.arm
-        noise = worlds.draw_noise()
-        worlds.in_threads(
-            lambda start, stop: step_tasks(
+
+        def share(start: int, stop: int) -> None:
+            noise = worlds.draw_noise(start, stop)
+            step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
                 worlds.cameras, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0], self.tasks,
                 worlds.masks,
-            )
-        )  # fmt: skip
+            )  # fmt: skip
+            self._look(start, stop)
+
+        worlds.in_threads(share)
+
+    def _look(self, start: int, stop: int) -> None:
+        """Make of the masks of tasks start to stop what the policy is to see of them."""
+        if self._sight is not None:
+            self._sight.look(start, stop, self.tasks)
+        if self._variation is not None:
+            self._variation.look(start, stop)
 
     def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
         """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""

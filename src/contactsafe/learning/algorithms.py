@@ -101,7 +101,7 @@ class SacConfig(PolicyConfig):
     buffer: int = 300_000
     learning_starts: int = 10_000
     update_every: int = 1
-    gradient_steps: int = 4
+    gradient_steps: int = 8
     target_share: float = 0.005
     entropy_start: float = 0.1
 

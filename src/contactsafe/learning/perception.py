@@ -1,5 +1,7 @@
 """From an observation to the latent, the same in training, in evaluation and on the robot. No torch."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import onnxruntime
 
@@ -47,12 +49,13 @@ class Perception:
         window_m: side of the tool's window, m; read for "tool".
         size: pixels along a side of what the encoder takes, or of the camera's mask.
         homography: board plane to camera pixels, (3, 3); not read for "paper".
+        threads: for "foveated", each with its share of a batch; a session has its own.
 
     Attributes:
         latent_size: how many numbers come out.
     """
 
-    def __init__(self, session, representation, window_m, size, homography):
+    def __init__(self, session, representation, window_m, size, homography, threads=1):
         if representation not in REPRESENTATIONS:
             allowed = ", ".join(REPRESENTATIONS)
             raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
@@ -62,6 +65,7 @@ class Perception:
         self.size = size
         self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
         self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
+        self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
     def __call__(self, masks, tool_positions):
@@ -78,7 +82,7 @@ class Perception:
             InvalidInputError: a shape or type differs.
         """
         if self.ground is not None:
-            return foveate(masks, tool_positions, self.ground)
+            return self._foveated(masks, tool_positions)
         if self.representation == "tool":
             views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
         else:
@@ -90,3 +94,11 @@ class Perception:
                     f"this encoder takes uint8 (N, {self.size}, {self.size})"
                 )
         return self.session.run(["latent"], {"mask": views})[0]
+
+    def _foveated(self, masks, tool_positions):
+        if self._threads is None or len(masks) < self._threads._max_workers:
+            return foveate(masks, tool_positions, self.ground)
+        shares = np.array_split(np.arange(len(masks)), self._threads._max_workers)
+        shares = [slice(share[0], share[-1] + 1) for share in shares]
+        seen = self._threads.map(lambda share: foveate(masks[share], tool_positions[share], self.ground), shares)
+        return np.concatenate(list(seen))

@@ -62,10 +62,10 @@ class PolicyConfig:
     resume: bool = False
     env_id: str = "contactsafe/Wiping-v0"
     randomise: bool = True
-    num_envs: int = 32
+    num_envs: int = 64
     total_steps: int = 1_500_000
     max_minutes: float = 0.0
-    rollout_steps: int = 128
+    rollout_steps: int = 64
     batch: int = 512
     learning_rate: float = 3e-4
     discount: float = 0.995

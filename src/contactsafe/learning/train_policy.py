@@ -87,7 +87,7 @@ def _encoded(raw_env, eyes, config):
     if eyes.encoder is not None:
         session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
     view = (vae["representation"], vae["window_m"], vae["size"])
-    perception = Perception(session, *view, _homography(raw_env))
+    perception = Perception(session, *view, _homography(raw_env), config.encoder_threads)
     scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
     scan = Scan(config.scan, rate_hz=config.rate_hz)
     return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, scan)

@@ -15,7 +15,8 @@ from contactsafe.compiled import compiled
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
-from contactsafe.sim.whiteboard import Whiteboard, row_is_bare
+from contactsafe.sim.whiteboard import CLEAN, Whiteboard
+from contactsafe.vision.words import WORD, words_of
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
@@ -49,7 +50,8 @@ class CameraTables(NamedTuple):
     """What drawing a mask needs to know of camera and board, computed once for both.
 
     Attributes:
-        pixels: number of the pixel each corner of each cell falls in, −1 outside, (rows, columns, 4).
+        pixels: row and column of the pixels that the corners of each cell fall in, each pixel once, then −1,
+            (rows · columns, 4, 2).
         rays: unit line of sight of each pixel, world, (size, size, 3).
         distance: along it to the board's plane, m, (size, size).
         position: of the camera, (3,), m.
@@ -110,19 +112,22 @@ def camera_at(cameras, index):
 
 
 def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:
-    """Number of the pixel that each corner of each cell falls in, −1 outside the image, (rows, columns, 4)."""
+    """Row and column of the pixels that each cell's corners fall in, each once, then −1, (rows · columns, 4, 2)."""
     cell = board.config.cell
     inset = 0.02  # of a cell: a corner belongs to its own cell
     i, j = np.meshgrid(np.arange(board.cells.shape[0]), np.arange(board.cells.shape[1]), indexing="ij")
-    pixels = np.empty((*board.cells.shape, 4), dtype=np.int32)
+    pixels = np.empty((board.cells.size, 4), dtype=np.int64)
     for k, (di, dj) in enumerate(((inset, inset), (inset, 1 - inset), (1 - inset, inset), (1 - inset, 1 - inset))):
         x = board.origin[0] + (i + di) * cell
         y = board.origin[1] + (j + dj) * cell
         u, v, w = (H[r, 0] * x + H[r, 1] * y + H[r, 2] for r in range(3))
         column, row = np.floor(u / w).astype(int), np.floor(v / w).astype(int)
         inside = (column >= 0) & (column < size) & (row >= 0) & (row < size) & (w > 0)
-        pixels[..., k] = np.where(inside, row * size + column, -1)
-    return pixels
+        pixel = np.where(inside, row * size + column, -1).ravel()
+        known = (pixels[:, :k] == pixel[:, None]).any(axis=1)
+        pixels[:, k] = np.where(known, -1, pixel)
+    pixels = -np.sort(-pixels, axis=1)
+    return np.where(pixels[..., None] < 0, -1, np.stack([pixels // size, pixels % size], axis=-1)).astype(np.int16)
 
 
 def _pixel_rays(camera: Camera, axes: np.ndarray) -> np.ndarray:
@@ -151,7 +156,7 @@ def render_mask(camera, cells, plant, out):
         out: uint8, (size, size); overwritten.
     """
     out[:] = OTHER_PIXEL
-    marked = _mark_ink(camera, cells, out.reshape(-1))
+    marked = _mark_ink(camera.pixels, cells.reshape(-1), out)
     xpos, xmat = view2(plant.geom_xpos, plant.ngeom, 3), view2(plant.geom_xmat, plant.ngeom, 9)
     for s in range(camera.shapes.shape[0]):
         geom = camera.shapes[s, 0]
@@ -159,21 +164,25 @@ def render_mask(camera, cells, plant, out):
 
 
 @compiled
-def _mark_ink(camera, cells, flat):
-    """Mark the pixels that ink or an object touches; give their numbers."""
-    marked = np.empty(flat.shape[0], dtype=np.int32)
+def _mark_ink(pixels, cells, out):
+    """Mark the pixels that ink or an object touches; give their rows and columns, (count, 2)."""
+    marked = np.empty((out.size, 2), dtype=np.int16)
     count = 0
-    for i in range(cells.shape[0]):
-        if row_is_bare(cells, i):
+    words = words_of(cells)
+    for w in range(words.shape[0] + 1):
+        if w < words.shape[0] and words[w] == 0:
             continue
-        for j in range(cells.shape[1]):
-            if cells[i, j] != 0:
-                for k in range(4):
-                    pixel = camera.pixels[i, j, k]
-                    if pixel >= 0 and flat[pixel] != INK_PIXEL:
-                        flat[pixel] = INK_PIXEL
-                        marked[count] = pixel
-                        count += 1
+        for p in range(WORD * w, min(WORD * (w + 1), cells.shape[0])):
+            if cells[p] == CLEAN:
+                continue
+            for k in range(4):
+                row, column = pixels[p, k, 0], pixels[p, k, 1]
+                if row < 0:
+                    break
+                if out[row, column] != INK_PIXEL:
+                    out[row, column] = INK_PIXEL
+                    marked[count, 0], marked[count, 1] = row, column
+                    count += 1
     return marked[:count]
 
 
@@ -197,8 +206,8 @@ def _hide_behind(camera, is_box, size, centre, mat, marked, out):
         stretch_u, stretch_v = 1.0 + abs(x[0]) / x[2], 1.0 + abs(x[1]) / x[2]
         u0, u1 = max(0, int(u - reach * stretch_u)), min(n, int(u + reach * stretch_u) + 2)
         v0, v1 = max(0, int(v - reach * stretch_v)), min(n, int(v + reach * stretch_v) + 2)
-    for pixel in marked:
-        row, column = pixel // n, pixel % n
+    for m in range(marked.shape[0]):
+        row, column = marked[m, 0], marked[m, 1]
         if v0 <= row < v1 and u0 <= column < u1 and out[row, column] == INK_PIXEL:
             ray, length = camera.rays[row, column], camera.distance[row, column]
             if is_box:

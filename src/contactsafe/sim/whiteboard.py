@@ -109,15 +109,6 @@ def _stamp(drawing, row, column, radius):
 
 
 @compiled
-def row_is_bare(cells, i):
-    """Whether nothing lies in one row of cells: looked at as a whole, which costs far less than cell by cell."""
-    found = np.uint8(0)
-    for j in range(cells.shape[1]):
-        found |= cells[i, j]
-    return found == 0
-
-
-@compiled
 def erase_under_pad(cells, origin_x, origin_y, cell, position, rotation, half_x, half_y):
     """Erase ink under a rectangular pad.
 

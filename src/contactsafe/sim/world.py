@@ -202,9 +202,9 @@ class Worlds:
         if self._threads is not None:
             self._threads.shutdown()
 
-    def draw_noise(self) -> np.ndarray:
-        """Draw the sensors' noise for one step of every world, (n, MAX_TICKS, channels)."""
-        for rng, noise in zip(self.rngs, self._noise, strict=True):
+    def draw_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
+        """Draw the sensors' noise for one step of worlds start to stop; gives that of all, (n, MAX_TICKS, channels)."""
+        for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
             rng.standard_normal(out=noise)
         return self._noise
 
@@ -229,13 +229,15 @@ class Worlds:
             InvalidInputError: too many ticks, none, or a trace too short for them.
         """
         ticks = self._checked(ticks, trace)
-        noise = self.draw_noise()
         traces = self.no_trace if trace is None else trace
-        self.in_threads(
-            lambda start, stop: run_worlds(
+
+        def share(start: int, stop: int) -> None:
+            noise = self.draw_noise(start, stop)
+            run_worlds(
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces
-            )
-        )
+            )  # fmt: skip
+
+        self.in_threads(share)
 
     def _checked(self, ticks, trace: np.ndarray | None) -> np.ndarray:
         """Give the ticks of each world, (n,), once they and the trace are sound."""

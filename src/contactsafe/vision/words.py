@@ -1,0 +1,14 @@
+"""Pictures of which most is bare, looked at eight pixels at a time."""
+
+import numpy as np
+
+from contactsafe.compiled import compiled
+
+WORD = 8
+"""Pixels in a word."""
+
+
+@compiled
+def words_of(flat):
+    """See a row of pixels, uint8 (n,), as words, uint64 (n // 8,)."""
+    return flat[: flat.shape[0] // WORD * WORD].view(np.uint64)
