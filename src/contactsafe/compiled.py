@@ -19,7 +19,7 @@ import numpy as np
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
-_ROOMS = ("robot", "vision", "control", "sim", "envs")  # where compiled functions call each other across files
+_ROOMS = ("robot", "control", "sim", "envs")  # where compiled functions call each other across files
 
 
 def _digest() -> str:

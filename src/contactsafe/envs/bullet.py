@@ -19,10 +19,11 @@ class BulletTasks(WipingTasks):
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         worlds = self.worlds
         _apply(worlds.controllers, self._limits, self.arm.q_min, self.arm.q_max, self._actions)
+        worlds.enter_changed()
         worlds.run(ticks, traces if traces.shape[1] else None)
         _judge(
-            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, self._rewards[0],
-            self.tasks, worlds.masks,
+            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, worlds.ledger,
+            self._rewards[0], self.tasks, worlds.masks,
         )  # fmt: skip
         worlds.in_threads(self._look)
 
@@ -34,9 +35,9 @@ def _apply(controllers, limits, q_min, q_max, actions):
 
 
 @compiled(nogil=True)
-def _judge(plants, controllers, cells, reports, cameras, rewards, tasks, masks):
+def _judge(plants, controllers, cells, reports, cameras, ledger, rewards, tasks, masks):
     for i in range(tasks.shape[0]):
-        judge(plants[i], controllers[i], cells[i], reports[i], cameras, rewards, tasks[i], masks[i])
+        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ledger, rewards, tasks[i], masks[i])
 
 
 class WipingBulletEnv(WipingEnv):

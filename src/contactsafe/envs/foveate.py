@@ -13,9 +13,7 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.envs.rectify import INK_BELOW
 from contactsafe.errors import InvalidInputError
-from contactsafe.vision.words import WORD, words_of
-
-_BARE = np.uint64(2**64 - 1)  # eight pixels without ink
+from contactsafe.robot.words import BARE, WORD, words_of
 
 RINGS = 10
 SECTORS = 16
@@ -128,7 +126,7 @@ def _foveate_one(mask, tool_x, tool_y, place, area, out):
     nearest = math.inf
     words = words_of(mask)
     for w in range(words.shape[0] + 1):
-        if w < words.shape[0] and words[w] == _BARE:
+        if w < words.shape[0] and words[w] == BARE:
             continue
         for p in range(WORD * w, min(WORD * (w + 1), mask.shape[0])):
             if mask[p] < INK_BELOW and area[p] > 0.0:

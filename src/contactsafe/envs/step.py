@@ -1,15 +1,12 @@
 """One policy step of many wiping tasks, compiled: action, ticks, mask, reward. Runs without the GIL."""
 
-import math
-
 import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose, observed_target
-from contactsafe.sim.camera import camera_at, render_mask
+from contactsafe.sim.camera import camera_at, draw_mask
+from contactsafe.sim.ink import nearest_ink, strike_out
 from contactsafe.sim.stepping import run_ticks, tool_position
-from contactsafe.sim.whiteboard import INK
-from contactsafe.vision.words import WORD, words_of
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
 
@@ -39,41 +36,6 @@ rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "force_limit_n"
 
 
 @compiled
-def nearest_ink(cells, origin, cell, position):
-    """Count the ink and find how far the nearest of it lies from a point along the board.
-
-    Args:
-        cells: uint8, (rows, columns).
-        origin: world corner of cell (0, 0), (2,), m.
-        cell: edge, m.
-        position: (≥ 2,), m.
-
-    Returns:
-        Number of ink cells; distance, m, 0 where there is none.
-    """
-    count = 0
-    best = math.inf
-    px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
-    columns = cells.shape[1]
-    flat = cells.reshape(-1)
-    words = words_of(flat)
-    for w in range(words.shape[0] + 1):
-        if w < words.shape[0] and words[w] == 0:
-            continue
-        i, j = WORD * w // columns, WORD * w % columns
-        for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
-            if flat[p] == INK:
-                count += 1
-                best = min(best, (i - px) * (i - px) + (j - py) * (j - py))
-            j += 1
-            if j == columns:
-                i, j = i + 1, 0
-    if count == 0:
-        return 0, 0.0
-    return count, math.sqrt(best) * cell
-
-
-@compiled
 def score(task, report, rewards, ink, distance):
     """Fill the reward's terms of one step, and the step's ends.
 
@@ -98,29 +60,31 @@ def score(task, report, rewards, ink, distance):
 
 @compiled(nogil=True)
 def step_tasks(
-    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, limits, q_min, q_max, actions,
-    rewards, tasks, masks,
+    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, ledger, limits, q_min, q_max,
+    actions, rewards, tasks, masks,
 ):  # fmt: skip
     """Run one policy step of each task from start to stop; the arrays are those of `Worlds` and `WipingTasks`."""
     for i in range(start, stop):
         apply_action(controllers[i], limits, q_min, q_max, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
-        judge(plants[i], controllers[i], cells[i], reports[i], cameras, rewards, tasks[i], masks[i])
+        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ledger, rewards, tasks[i], masks[i])
 
 
 @compiled
-def judge(plant, controller, cells, report, cameras, rewards, task, mask):
-    """Score the step that one world has run and look at it."""
-    ink, distance = nearest_ink(cells, plant.origin, plant.cell, tool_position(plant))
+def judge(i, plant, controller, cells, report, cameras, ledger, rewards, task, mask):
+    """Score the step that world i has run and look at it."""
+    camera = camera_at(cameras, plant.camera)
+    strike_out(ledger, i, cells, camera.pixels)
+    ink, distance = nearest_ink(ledger, i, cells, plant.origin, plant.cell, tool_position(plant))
     score(task, report, rewards, ink, distance)
     task.steps += 1
-    observe(plant, controller, cells, cameras, task, mask)
+    observe(plant, controller, camera, ledger.shown[i], task, mask)
 
 
 @compiled
-def observe(plant, controller, cells, cameras, task, mask):
+def observe(plant, controller, camera, shown, task, mask):
     """Fill what the policy sees: the tool's pose, where it is told to be and how stiffly, the force, the mask."""
     observed_pose(controller, task.pose)
     observed_target(controller, task.pose, task.target)
     task.force[:] = controller.state.tool_force
-    render_mask(camera_at(cameras, plant.camera), cells, plant, mask)
+    draw_mask(camera, shown, plant, mask)

@@ -9,13 +9,15 @@ from contactsafe.control import presets
 from contactsafe.envs.action import DOWN, action_limits
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.pushes import Pusher
-from contactsafe.envs.step import REWARD_TERMS, nearest_ink, observe, rewards_dtype, step_tasks, task_dtype
+from contactsafe.envs.step import REWARD_TERMS, observe, rewards_dtype, step_tasks, task_dtype
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.sim.camera import camera_at
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import draw_board
+from contactsafe.sim.ink import nearest_ink
 from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
 from contactsafe.sim.variation import Variation
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
@@ -120,7 +122,10 @@ class WipingTasks:
         controller["output"]["rotation"] = controller["dynamics"]["rotation"]
         task = self.tasks[i]
         plant = worlds.plants[i]
-        ink, distance = nearest_ink(worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"])
+        worlds.enter_ink(i)
+        ink, distance = nearest_ink(
+            worlds.ledger, i, worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"]
+        )
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
         task["light"] = 0 if self._sight is None else rng.integers(2**31)
@@ -129,7 +134,9 @@ class WipingTasks:
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
         worlds, task = self.worlds, self.tasks[i]
-        observe(worlds.plants[i], worlds.controllers[i], worlds.cells[i], worlds.cameras, task, worlds.masks[i])
+        worlds.enter_ink(i)
+        camera = camera_at(worlds.cameras, worlds.plants[i]["camera"])
+        observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ledger.shown[i], task, worlds.masks[i])
         if self._sight is not None:
             self._sight.look(i, i + 1, self.tasks)
         if self._variation is not None:
@@ -179,13 +186,14 @@ class WipingTasks:
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         """Run one policy step of so many ticks, (n,), under `self._actions`, and look."""
         worlds, arm = self.worlds, self.arm
+        worlds.enter_changed()
 
         def share(start: int, stop: int) -> None:
             noise = worlds.draw_noise(start, stop)
             step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
-                worlds.cameras, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0], self.tasks,
-                worlds.masks,
+                worlds.cameras, worlds.ledger, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0],
+                self.tasks, worlds.masks,
             )  # fmt: skip
             self._look(start, stop)
 

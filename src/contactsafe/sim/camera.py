@@ -15,8 +15,8 @@ from contactsafe.compiled import compiled
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
-from contactsafe.sim.whiteboard import CLEAN, Whiteboard
-from contactsafe.vision.words import WORD, words_of
+from contactsafe.sim.ink import count_shown, list_cells
+from contactsafe.sim.whiteboard import Whiteboard
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
@@ -50,8 +50,8 @@ class CameraTables(NamedTuple):
     """What drawing a mask needs to know of camera and board, computed once for both.
 
     Attributes:
-        pixels: row and column of the pixels that the corners of each cell fall in, each pixel once, then −1,
-            (rows · columns, 4, 2).
+        pixels: row and column of the pixels that the corners of each cell fall in, each pixel once, then −1, int16
+            (rows, columns, 4, 2).
         rays: unit line of sight of each pixel, world, (size, size, 3).
         distance: along it to the board's plane, m, (size, size).
         position: of the camera, (3,), m.
@@ -112,21 +112,21 @@ def camera_at(cameras, index):
 
 
 def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:
-    """Row and column of the pixels that each cell's corners fall in, each once, then −1, (rows · columns, 4, 2)."""
+    """Row and column of the pixels that each cell's corners fall in, each once, then −1, (rows, columns, 4, 2)."""
     cell = board.config.cell
     inset = 0.02  # of a cell: a corner belongs to its own cell
     i, j = np.meshgrid(np.arange(board.cells.shape[0]), np.arange(board.cells.shape[1]), indexing="ij")
-    pixels = np.empty((board.cells.size, 4), dtype=np.int64)
+    pixels = np.empty((*board.cells.shape, 4), dtype=np.int64)
     for k, (di, dj) in enumerate(((inset, inset), (inset, 1 - inset), (1 - inset, inset), (1 - inset, 1 - inset))):
         x = board.origin[0] + (i + di) * cell
         y = board.origin[1] + (j + dj) * cell
         u, v, w = (H[r, 0] * x + H[r, 1] * y + H[r, 2] for r in range(3))
         column, row = np.floor(u / w).astype(int), np.floor(v / w).astype(int)
         inside = (column >= 0) & (column < size) & (row >= 0) & (row < size) & (w > 0)
-        pixel = np.where(inside, row * size + column, -1).ravel()
-        known = (pixels[:, :k] == pixel[:, None]).any(axis=1)
-        pixels[:, k] = np.where(known, -1, pixel)
-    pixels = -np.sort(-pixels, axis=1)
+        pixel = np.where(inside, row * size + column, -1)
+        known = (pixels[..., :k] == pixel[..., None]).any(axis=-1)
+        pixels[..., k] = np.where(known, -1, pixel)
+    pixels = -np.sort(-pixels, axis=-1)
     return np.where(pixels[..., None] < 0, -1, np.stack([pixels // size, pixels % size], axis=-1)).astype(np.int16)
 
 
@@ -147,7 +147,7 @@ def _distance_to_plane(rays: np.ndarray, position: np.ndarray, z: float) -> np.n
 
 @compiled(nogil=True)
 def render_mask(camera, cells, plant, out):
-    """Draw a mask: ink and dark objects 0, everything else 255.
+    """Draw a mask of a board as it is: ink and dark objects 0, everything else 255.
 
     Args:
         camera: `CameraTables`.
@@ -155,8 +155,17 @@ def render_mask(camera, cells, plant, out):
         plant: `plant_dtype` record, for where the arm's shapes are.
         out: uint8, (size, size); overwritten.
     """
+    listed = np.empty((cells.size, 2), dtype=np.int16)
+    shown = np.empty(out.shape, dtype=np.uint16)
+    count_shown(camera.pixels, listed[: list_cells(cells, listed)], shown)
+    draw_mask(camera, shown, plant, out)
+
+
+@compiled(nogil=True)
+def draw_mask(camera, shown, plant, out):
+    """The same from the numbers of cells that the pixels show, uint16 (size, size), as a `Ledger` keeps them."""
     out[:] = OTHER_PIXEL
-    marked = _mark_ink(camera.pixels, cells.reshape(-1), out)
+    marked = _mark(shown, out)
     xpos, xmat = view2(plant.geom_xpos, plant.ngeom, 3), view2(plant.geom_xmat, plant.ngeom, 9)
     for s in range(camera.shapes.shape[0]):
         geom = camera.shapes[s, 0]
@@ -164,25 +173,18 @@ def render_mask(camera, cells, plant, out):
 
 
 @compiled
-def _mark_ink(pixels, cells, out):
-    """Mark the pixels that ink or an object touches; give their rows and columns, (count, 2)."""
+def _mark(shown, out):
+    """Mark the pixels that show anything; give their rows and columns, (count, 2)."""
     marked = np.empty((out.size, 2), dtype=np.int16)
     count = 0
-    words = words_of(cells)
-    for w in range(words.shape[0] + 1):
-        if w < words.shape[0] and words[w] == 0:
+    for row in range(out.shape[0]):
+        if not shown[row].any():
             continue
-        for p in range(WORD * w, min(WORD * (w + 1), cells.shape[0])):
-            if cells[p] == CLEAN:
-                continue
-            for k in range(4):
-                row, column = pixels[p, k, 0], pixels[p, k, 1]
-                if row < 0:
-                    break
-                if out[row, column] != INK_PIXEL:
-                    out[row, column] = INK_PIXEL
-                    marked[count, 0], marked[count, 1] = row, column
-                    count += 1
+        for column in range(out.shape[1]):
+            if shown[row, column] > 0:
+                out[row, column] = INK_PIXEL
+                marked[count, 0], marked[count, 1] = row, column
+                count += 1
     return marked[:count]
 
 

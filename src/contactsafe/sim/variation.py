@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.robot.words import BARE, WORD, words_of
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
 from contactsafe.sim.randomisation import MAX_DELAY_STEPS, Randomisation, draw, draw_dtype
@@ -144,9 +145,13 @@ def _spoil(mask, drawn, random):
     missed, invented = drawn[0].ink_missed, drawn[0].ink_invented
     flat = mask.reshape(-1)
     if missed > 0.0:
-        for p in range(flat.shape[0]):
-            if flat[p] == INK_PIXEL and _uniform(random) < missed:
-                flat[p] = OTHER_PIXEL
+        words = words_of(flat)
+        for w in range(words.shape[0] + 1):
+            if w < words.shape[0] and words[w] == BARE:
+                continue
+            for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
+                if flat[p] == INK_PIXEL and _uniform(random) < missed:
+                    flat[p] = OTHER_PIXEL
     for _ in range(int(invented + _uniform(random))):
         flat[int(_uniform(random) * flat.shape[0])] = INK_PIXEL
 

@@ -17,11 +17,13 @@ class Whiteboard:
 
     Attributes:
         cells: what lies in each cell, uint8, (rows along x, columns along y).
+        changed: whether anything was drawn, laid or cleared since this was last set to false.
     """
 
     def __init__(self, config: BoardConfig):
         self.config = config
         self.cells = np.zeros(tuple(round(edge / config.cell) for edge in config.size), dtype=np.uint8)
+        self.changed = True
         x, y, _ = config.centre
         self.origin = np.array([x - config.size[0] / 2, y - config.size[1] / 2])
         half = config.ink_size / 2
@@ -36,6 +38,7 @@ class Whiteboard:
     def clear(self) -> None:
         """Remove everything."""
         self.cells[:] = CLEAN
+        self.changed = True
 
     def draw(self, drawing: np.ndarray) -> None:
         """Put a drawing on the part of the board that may be drawn on.
@@ -55,6 +58,7 @@ class Whiteboard:
         index = (np.arange(area.shape[0]) + 0.5) * drawing.shape[0] / area.shape[0]
         index = index.astype(int)
         area[:] = np.where(drawing[np.ix_(index, index)] != 0, INK, CLEAN)
+        self.changed = True
 
     def draw_random(self, rng: np.random.Generator) -> None:
         """Draw one to four strokes and up to two blobs somewhere in the ink area."""
@@ -79,6 +83,7 @@ class Whiteboard:
         i0, j0 = np.maximum(np.round(low).astype(int), 0)
         i1, j1 = np.maximum(np.round(high).astype(int), 0)
         self.cells[i0:i1, j0:j1] = OBJECT
+        self.changed = True
 
 
 def _draw_stroke(drawing: np.ndarray, rng: np.random.Generator, cell: float) -> None:

@@ -16,6 +16,7 @@ from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.ink import empty_ledger, enter
 from contactsafe.sim.records import fill_plant, noise_channels, plant_dtype, report_dtype, trace_dtype
 from contactsafe.sim.scene import build_plant
 from contactsafe.sim.snapshot import Part, of_array, of_generators, of_physics, of_records, put, take
@@ -90,6 +91,7 @@ class Worlds:
         masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
         camera: `CameraTables` as calibrated.
         cameras: those that look, side by side; `plants["camera"]` says which one at which world.
+        ledger: `Ledger` of the boards and the cameras that look at them.
         homography: of board plane to mask pixels, (3, 3).
         no_trace: an empty trace, for `run_worlds` and its like.
     """
@@ -123,6 +125,7 @@ class Worlds:
         self.masks = np.full((n, size, size), 255, dtype=np.uint8)
         self.camera = camera_tables(self.config.camera, self.boards[0], self.models[0])
         self.cameras = stack_cameras([self.camera])
+        self.ledger = empty_ledger(n, self.boards[0].cells.size, size)
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
@@ -168,6 +171,17 @@ class Worlds:
         plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
 
+    def enter_ink(self, i: int) -> None:
+        """Take down what lies on board i and where its camera shows it: it was drawn on, or the camera changed."""
+        enter(self.ledger, i, self.cells[i], self.cameras.pixels[self.plants[i]["camera"]])
+        self.boards[i].changed = False
+
+    def enter_changed(self) -> None:
+        """The same for every board that was drawn on since."""
+        for i, board in enumerate(self.boards):
+            if board.changed:
+                self.enter_ink(i)
+
     def place(self, i: int, q) -> None:
         """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
         self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
@@ -196,6 +210,8 @@ class Worlds:
             InvalidInputError: it is of other worlds, or of another version.
         """
         put(self.parts(), snapshot)
+        for i in range(self.n):
+            self.enter_ink(i)
 
     def close(self) -> None:
         """Stop the threads."""

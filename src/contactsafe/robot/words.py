@@ -7,6 +7,9 @@ from contactsafe.compiled import compiled
 WORD = 8
 """Pixels in a word."""
 
+BARE = np.uint64(2**64 - 1)
+"""Eight pixels of a mask without ink: all 255."""
+
 
 @compiled
 def words_of(flat):

@@ -1,0 +1,129 @@
+"""Which cells of a board are not clean, and which pixels show them: kept from look to look, for wiping only takes away.
+
+A board has ten times as many cells as hold ink, and a mask ten times as many pixels as show any: going through all of
+them sixty times a second costs more than the physics.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contactsafe.compiled import compiled
+from contactsafe.robot.words import WORD, words_of
+from contactsafe.sim.whiteboard import CLEAN, INK
+
+
+class Ledger(NamedTuple):
+    """What lies on N boards.
+
+    Attributes:
+        cells: row and column of each cell that is not clean, in order, int16 (n, rows · columns, 2).
+        count: how many those are, (n,).
+        shown: in how many of them each pixel has a part, uint16 (n, size, size).
+    """
+
+    cells: np.ndarray
+    count: np.ndarray
+    shown: np.ndarray
+
+
+def empty_ledger(n: int, cells: int, size: int) -> Ledger:
+    """Make a ledger of n clean boards of so many cells, seen by cameras of size × size pixels."""
+    return Ledger(
+        cells=np.zeros((n, cells, 2), dtype=np.int16),
+        count=np.zeros(n, dtype=np.int64),
+        shown=np.zeros((n, size, size), dtype=np.uint16),
+    )
+
+
+@compiled(nogil=True)
+def enter(ledger, i, cells, pixels):
+    """Enter board i as it is now.
+
+    Args:
+        ledger: `Ledger`; updated.
+        i: which board.
+        cells: the board's, uint8, (rows, columns).
+        pixels: of the camera that looks at it, see `CameraTables`.
+    """
+    ledger.count[i] = list_cells(cells, ledger.cells[i])
+    count_shown(pixels, ledger.cells[i, : ledger.count[i]], ledger.shown[i])
+
+
+@compiled
+def strike_out(ledger, i, cells, pixels):
+    """Take out of board i's entries what has been wiped since; arguments as for `enter`."""
+    listed, shown = ledger.cells[i], ledger.shown[i]
+    kept = 0
+    for m in range(ledger.count[i]):
+        row, column = listed[m, 0], listed[m, 1]
+        if cells[row, column] == CLEAN:
+            _add(shown, pixels, row, column, -1)
+        else:
+            listed[kept, 0], listed[kept, 1] = row, column
+            kept += 1
+    ledger.count[i] = kept
+
+
+@compiled
+def list_cells(cells, out):
+    """Write row and column of each cell that is not clean to `out`, (rows · columns, 2); give their number."""
+    columns = cells.shape[1]
+    flat = cells.reshape(-1)
+    words = words_of(flat)
+    count = 0
+    for w in range(words.shape[0] + 1):
+        if w < words.shape[0] and words[w] == 0:
+            continue
+        for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
+            if flat[p] != CLEAN:
+                out[count, 0], out[count, 1] = p // columns, p % columns
+                count += 1
+    return count
+
+
+@compiled
+def count_shown(pixels, listed, shown):
+    """Count for each pixel, (size, size), in how many of the listed cells, (count, 2), it has a part."""
+    shown[:] = 0
+    for m in range(listed.shape[0]):
+        _add(shown, pixels, listed[m, 0], listed[m, 1], 1)
+
+
+@compiled
+def _add(shown, pixels, row, column, number):
+    for k in range(4):
+        v, u = pixels[row, column, k, 0], pixels[row, column, k, 1]
+        if v < 0:
+            return
+        shown[v, u] += number
+
+
+@compiled(nogil=True)
+def nearest_ink(ledger, i, cells, origin, cell, position):
+    """Count the ink and find how far the nearest of it lies from a point along the board.
+
+    Args:
+        ledger: `Ledger`.
+        i: which board.
+        cells: the board's, uint8, (rows, columns).
+        origin: world corner of cell (0, 0), (2,), m.
+        cell: edge, m.
+        position: (≥ 2,), m.
+
+    Returns:
+        Number of ink cells; distance, m, 0 where there is none.
+    """
+    listed = ledger.cells[i]
+    count = 0
+    best = math.inf
+    px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
+    for m in range(ledger.count[i]):
+        row, column = listed[m, 0], listed[m, 1]
+        if cells[row, column] == INK:
+            count += 1
+            best = min(best, (row - px) * (row - px) + (column - py) * (column - py))
+    if count == 0:
+        return 0, 0.0
+    return count, math.sqrt(best) * cell
