@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.sim.camera import camera_at, render_mask
-from contactsafe.sim.config import BoardConfig, WorldConfig
+from contactsafe.sim.config import BoardConfig, Camera, WorldConfig
 from contactsafe.sim.ink import enter, nearest_ink
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.whiteboard import INK, OBJECT
@@ -81,3 +81,17 @@ def test_a_board_of_any_size_is_gone_through_to_its_last_cell(size):
     enter(worlds.ledger, 0, worlds.cells[0], worlds.cameras.pixels[0])
     assert worlds.ledger.count[0] == 2
     assert_array_equal(worlds.ledger.cells[0, 1], np.subtract(worlds.cells[0].shape, 1))
+
+
+@pytest.mark.parametrize("size", [96, 90, 81])
+def test_a_mask_of_any_size_is_drawn_and_spoiled_to_its_last_pixel(size):
+    camera = Camera(size=size, focal_px=180.0 * size / 128)
+    config = WipingConfig(world=WorldConfig(camera=camera), randomisation=Randomisation(delay_steps=(1, 1)))
+    tasks = WipingTasks(config, 1, seed=0)
+    tasks.reset(0, np.random.default_rng(0), drawing=np.ones((2, 2)), start=(0.5, 0.0, 0.1))
+    worlds, last = tasks.worlds, []
+    worlds.ledger.shown[0, -1, -1] = 1
+    for _ in range(3):
+        tasks.step(np.zeros((1, 18)))
+        last.append(worlds.masks[0, -1, -1])
+    assert last == [255, 0, 0]  # late by one

@@ -175,15 +175,18 @@ def draw_mask(camera, shown, plant, out):
 @compiled
 def _mark(shown, out):
     """Mark the pixels that show anything; give their rows and columns, (count, 2)."""
-    marked = np.empty((out.size, 2), dtype=np.int16)
+    size = out.shape[1]
+    counts, flat = shown.reshape(-1), out.reshape(-1)
+    marked = np.empty((flat.shape[0], 2), dtype=np.int16)
     count = 0
-    for row in range(out.shape[0]):
-        if not shown[row].any():
+    fours = counts[: counts.shape[0] // 4 * 4].view(np.uint64)
+    for four in range(fours.shape[0] + 1):
+        if four < fours.shape[0] and fours[four] == 0:
             continue
-        for column in range(out.shape[1]):
-            if shown[row, column] > 0:
-                out[row, column] = INK_PIXEL
-                marked[count, 0], marked[count, 1] = row, column
+        for p in range(4 * four, min(4 * four + 4, flat.shape[0])):
+            if counts[p] > 0:
+                flat[p] = INK_PIXEL
+                marked[count, 0], marked[count, 1] = p // size, p % size
                 count += 1
     return marked[:count]
 
@@ -208,10 +211,13 @@ def _hide_behind(camera, is_box, size, centre, mat, marked, out):
         stretch_u, stretch_v = 1.0 + abs(x[0]) / x[2], 1.0 + abs(x[1]) / x[2]
         u0, u1 = max(0, int(u - reach * stretch_u)), min(n, int(u + reach * stretch_u) + 2)
         v0, v1 = max(0, int(v - reach * stretch_v)), min(n, int(v + reach * stretch_v) + 2)
+    rays = camera.rays
     for m in range(marked.shape[0]):
         row, column = marked[m, 0], marked[m, 1]
         if v0 <= row < v1 and u0 <= column < u1 and out[row, column] == INK_PIXEL:
-            ray, length = camera.rays[row, column], camera.distance[row, column]
+            # A tuple: a slice of an array would be counted in and out of use, which costs more than the test.
+            ray = (rays[row, column, 0], rays[row, column, 1], rays[row, column, 2])
+            length = camera.distance[row, column]
             if is_box:
                 hit = _ray_meets_box(eye, ray, length, centre, mat, size)
             else:

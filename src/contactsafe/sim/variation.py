@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.words import BARE, WORD, words_of
+from contactsafe.robot.words import BARE, WORD, copy_picture, words_of
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
 from contactsafe.sim.randomisation import MAX_DELAY_STEPS, Randomisation, draw, draw_dtype
@@ -135,8 +135,9 @@ def _look(start, stop, drawn, masks, frames, newest, random):
         _spoil(masks[i], drawn[i : i + 1], random[i : i + 1])
         count = frames.shape[1]
         newest[i] = (newest[i] + 1) % count
-        frames[i, newest[i]] = masks[i]
-        masks[i] = frames[i, (newest[i] - drawn[i].delay_steps) % count]
+        copy_picture(masks[i], frames[i, newest[i]])
+        if drawn[i].delay_steps > 0:
+            copy_picture(frames[i, (newest[i] - drawn[i].delay_steps) % count], masks[i])
 
 
 @compiled(nogil=True)

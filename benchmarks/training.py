@@ -1,0 +1,161 @@
+"""Policy steps a second of `contactsafe train ppo` as it is set up by default, and where the time goes.
+
+    python benchmarks/training.py [rollouts]
+
+It takes the time of rollouts and updates as training runs them, without writing checkpoints. The clock on the wall
+splits each step into worlds, eyes, policy and bookkeeping, and update; then the worlds' processor time is split by
+running their parts alone. Networks and boards are those of a beginner, who spends much time in contact.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from contactsafe.compiled import compiled
+from contactsafe.envs.config import WipingConfig
+from contactsafe.learning.algorithms import PpoConfig
+from contactsafe.learning.observation import ObservationScaling
+from contactsafe.learning.perception import Perception
+from contactsafe.learning.scan import Scan
+from contactsafe.learning.vec_env import EncodedVecEnv
+from contactsafe.sim.camera import camera_at, draw_mask
+from contactsafe.sim.ink import nearest_ink, strike_out
+from contactsafe.sim.randomisation import Randomisation
+from contactsafe.sim.stepping import run_ticks, tool_position
+
+ROLLOUTS = 6
+
+
+class Clock(BaseCallback):
+    """Adds up how long rollouts and updates take."""
+
+    def __init__(self):
+        super().__init__()
+        self.rollouts = self.updates = self.ended = 0.0
+        self.begun = time.perf_counter()
+
+    def _on_rollout_start(self):
+        now = time.perf_counter()
+        self.updates += now - self.ended if self.ended else 0.0
+        self.begun = now
+
+    def _on_rollout_end(self):
+        self.ended = time.perf_counter()
+        self.rollouts += self.ended - self.begun
+
+    def _on_step(self):
+        return True
+
+
+def timed(owner, name, spent):
+    """Have a method's calls timed, in `spent[name]`, s."""
+    inner = getattr(owner, name)
+
+    def outer(*arguments):
+        begun = time.perf_counter()
+        result = inner(*arguments)
+        spent[name] = spent.get(name, 0.0) + time.perf_counter() - begun
+        return result
+
+    setattr(owner, name, outer)
+
+
+def make(config):
+    """Make the environment as `contactsafe train` does, on foveated eyes whose statistics do not matter here."""
+    task = WipingConfig(randomisation=Randomisation.broad())
+    raw = gymnasium.make_vec(config.env_id, num_envs=config.num_envs, config=task)
+    perception = Perception(None, "foveated", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
+    zeros = np.zeros(perception.latent_size)
+    scaling = ObservationScaling.from_statistics(config.observes, zeros, zeros + 1.0)
+    return EncodedVecEnv(raw, perception, scaling, scan=Scan(config.scan))
+
+
+@compiled
+def ticks_alone(worlds, noise, n):
+    plants, controllers, cells, reports, traces = worlds
+    for i in range(plants.shape[0]):
+        for _ in range(n):
+            run_ticks(plants[i], controllers[i], cells[i], noise[i], 17, reports[i], traces[i])
+
+
+@compiled
+def ink_alone(worlds, cameras, ledger, n):
+    plants, _, cells, _, _ = worlds
+    found = 0
+    for i in range(plants.shape[0]):
+        camera = camera_at(cameras, plants[i].camera)
+        for _ in range(n):
+            strike_out(ledger, i, cells[i], camera.pixels)
+            place = tool_position(plants[i])
+            found += nearest_ink(ledger, i, cells[i], plants[i].origin, plants[i].cell, place)[0]
+    return found
+
+
+@compiled
+def masks_alone(worlds, cameras, ledger, masks, n):
+    plants = worlds[0]
+    for i in range(plants.shape[0]):
+        camera = camera_at(cameras, plants[i].camera)
+        for _ in range(n):
+            draw_mask(camera, ledger.shown[i], plants[i], masks[i])
+
+
+def processor_time(run, n, worlds):
+    """Give the processor time of one step of one world, µs: the least of several tries."""
+    best = np.inf
+    for _ in range(5):
+        begun = time.thread_time()
+        run(n)
+        best = min(best, time.thread_time() - begun)
+    return 1e6 * best / (n * worlds)
+
+
+def main() -> None:
+    """Measure and print."""
+    rollouts = int(sys.argv[1]) if len(sys.argv) > 1 else ROLLOUTS
+    with tempfile.TemporaryDirectory() as folder:
+        config = PpoConfig(out=Path(folder), total_steps=10**7)
+        torch.set_num_threads(config.threads)
+        env = make(config)
+        model, spent = config.make_model(env), {}
+        model.learn(config.num_envs * config.rollout_steps)  # compiles
+        tasks = env.env.unwrapped.tasks
+        timed(tasks.worlds, "in_threads", spent)
+        timed(env, "perception", spent)
+        clock, steps = Clock(), rollouts * config.num_envs * config.rollout_steps
+        begun = time.perf_counter()
+        model.learn(steps, callback=clock, reset_num_timesteps=False)
+        whole = time.perf_counter() - begun
+        print(f"{steps / whole:7.0f} policy steps a second, {config.num_envs} worlds, {steps} steps")
+        update = whole - clock.rollouts
+        parts = {
+            "worlds, in threads": spent["in_threads"],
+            "eyes, in threads": spent["perception"],
+            "policy and bookkeeping": clock.rollouts - spent["in_threads"] - spent["perception"],
+            "update": update,
+        }
+        for name, seconds in parts.items():
+            print(f"{1e6 * seconds / steps:7.0f} us a step on the wall, {seconds / whole:4.0%}: {name}")
+        worlds = tasks.worlds
+        records = (worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.no_trace)
+        alone = {
+            "17 ticks of physics and control": lambda n: ticks_alone(records, worlds.draw_noise(), n),
+            "ink counted, nearest found": lambda n: ink_alone(records, worlds.cameras, worlds.ledger, n),
+            "mask": lambda n: masks_alone(records, worlds.cameras, worlds.ledger, worlds.masks, n),
+            "noise of the sensors": lambda n: [worlds.draw_noise() for _ in range(n)],
+            "what segmentation does to it": lambda n: [tasks._look(0, worlds.n) for _ in range(n)],
+        }
+        for name, run in alone.items():
+            run(1)
+            print(f"{processor_time(run, 4, worlds.n):7.1f} us of a core, one world: {name}")
+        env.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""Draw the learning curves of runs of `contactsafe train` into one picture, and say when each cleared its boards.
+
+    python tools/learning_curves.py runs/seed0 runs/seed1 runs/seed2 --out docs/learning.png
+
+Share of boards and ink are means over the last hundred episodes of training: with exploration, on worlds that differ.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+SHARE = 0.9
+
+
+def curve(run: Path) -> dict[str, list[float]]:
+    """Read a run's log: minutes, steps, share of boards cleared, share of ink left."""
+    log = EventAccumulator(str(run))
+    log.Reload()
+    minutes = {event.step: event.value for event in log.Scalars("time/minutes")}
+    cleared = {event.step: event.value for event in log.Scalars("episode/success")}
+    left = {event.step: event.value for event in log.Scalars("episode/ink_left")}
+    steps = sorted(cleared)
+    return {
+        "steps": steps,
+        "minutes": [minutes[step] for step in steps],
+        "cleared": [cleared[step] for step in steps],
+        "left": [left[step] for step in steps],
+    }
+
+
+def row(run: Path, c: dict[str, list[float]]) -> str:
+    """Write a run as a line of Markdown's table."""
+    reached = next((k for k, share in enumerate(c["cleared"]) if share >= SHARE), None)
+    at = "never" if reached is None else f"{c['minutes'][reached]:.1f} min, {c['steps'][reached]:,} steps"
+    manifest = run / "bundle" / "bundle.json"
+    results = json.loads(manifest.read_text(encoding="utf-8"))["results"] if manifest.exists() else {}
+    boards = f"{results['cleared_99']:.0%} of {results['episodes']}" if results else "-"
+    return f"| {run.name} | {at} | {c['minutes'][-1]:.1f} min, {c['steps'][-1]:,} steps | {boards} |"
+
+
+def draw(curves: dict[str, dict[str, list[float]]], out: Path) -> None:
+    """Draw share of boards cleared and ink left over the minutes trained."""
+    figure = Figure(figsize=(7.5, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2, sharex=True)
+    for name, c in curves.items():
+        left.plot(c["minutes"], [100 * share for share in c["cleared"]], label=name)
+        right.plot(c["minutes"], [100 * share for share in c["left"]], label=name)
+    left.axhline(100 * SHARE, color="0.6", linewidth=0.8, linestyle="--")
+    left.set(title="boards cleared, %", xlabel="minutes trained", ylim=(0, 100), xlim=(0, None))
+    right.set(title="ink left, % (logarithmic)", xlabel="minutes trained", yscale="log")
+    left.legend(loc="lower right", frameon=False)
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(out, dpi=110)
+
+
+def main() -> None:
+    """Draw and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("runs", nargs="+", type=Path, help="folders of runs, as --out of contactsafe train named them")
+    parser.add_argument("--out", type=Path, default=Path("learning.png"), help="picture to write")
+    arguments = parser.parse_args()
+    curves = {run.name: curve(run) for run in arguments.runs}
+    print(f"| run | {SHARE:.0%} of the last hundred training boards | whole run | held-out boards, 99 % of ink gone |")
+    print("|---|---|---|---|")
+    for run, c in zip(arguments.runs, curves.values(), strict=True):
+        print(row(run, c))
+    draw(curves, arguments.out)
+
+
+if __name__ == "__main__":
+    main()
