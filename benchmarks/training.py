@@ -33,21 +33,17 @@ ROLLOUTS = 6
 
 
 class Clock(BaseCallback):
-    """Adds up how long rollouts and updates take."""
+    """Adds up how long rollouts take; what is left of the whole are updates."""
 
     def __init__(self):
         super().__init__()
-        self.rollouts = self.updates = self.ended = 0.0
-        self.begun = time.perf_counter()
+        self.rollouts = self.begun = 0.0
 
     def _on_rollout_start(self):
-        now = time.perf_counter()
-        self.updates += now - self.ended if self.ended else 0.0
-        self.begun = now
+        self.begun = time.perf_counter()
 
     def _on_rollout_end(self):
-        self.ended = time.perf_counter()
-        self.rollouts += self.ended - self.begun
+        self.rollouts += time.perf_counter() - self.begun
 
     def _on_step(self):
         return True
@@ -126,30 +122,35 @@ def main() -> None:
         model, spent = config.make_model(env), {}
         model.learn(config.num_envs * config.rollout_steps)  # compiles
         tasks = env.env.unwrapped.tasks
+        # Spread over their episodes, as they are after a while: so many end in every rollout.
+        tasks.tasks["steps"] = np.linspace(0, tasks.step_limit, tasks.worlds.n, endpoint=False)
         timed(tasks.worlds, "in_threads", spent)
+        timed(env.env, "step", spent)
         timed(env, "perception", spent)
         clock, steps = Clock(), rollouts * config.num_envs * config.rollout_steps
         begun = time.perf_counter()
         model.learn(steps, callback=clock, reset_num_timesteps=False)
         whole = time.perf_counter() - begun
         print(f"{steps / whole:7.0f} policy steps a second, {config.num_envs} worlds, {steps} steps")
-        update = whole - clock.rollouts
         parts = {
             "worlds, in threads": spent["in_threads"],
+            "resets, observations, rewards": spent["step"] - spent["in_threads"],
             "eyes, in threads": spent["perception"],
-            "policy and bookkeeping": clock.rollouts - spent["in_threads"] - spent["perception"],
-            "update": update,
+            "policy and bookkeeping": clock.rollouts - spent["step"] - spent["perception"],
+            "update": whole - clock.rollouts,
         }
         for name, seconds in parts.items():
             print(f"{1e6 * seconds / steps:7.0f} us a step on the wall, {seconds / whole:4.0%}: {name}")
         worlds = tasks.worlds
         records = (worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.no_trace)
+        noise = worlds.draw_noise()
         alone = {
-            "17 ticks of physics and control": lambda n: ticks_alone(records, worlds.draw_noise(), n),
-            "ink counted, nearest found": lambda n: ink_alone(records, worlds.cameras, worlds.ledger, n),
+            "17 ticks of physics and control": lambda n: ticks_alone(records, noise, n),
+            "ink counted, nearest found (nothing wiped)": lambda n: ink_alone(
+                records, worlds.cameras, worlds.ledger, n
+            ),
             "mask": lambda n: masks_alone(records, worlds.cameras, worlds.ledger, worlds.masks, n),
             "noise of the sensors": lambda n: [worlds.draw_noise() for _ in range(n)],
-            "what segmentation does to it": lambda n: [tasks._look(0, worlds.n) for _ in range(n)],
         }
         for name, run in alone.items():
             run(1)

@@ -3,6 +3,7 @@
     python tools/learning_curves.py runs/seed0 runs/seed1 runs/seed2 --out docs/learning.png
 
 Share of boards and ink are means over the last hundred episodes of training: with exploration, on worlds that differ.
+Before every world has had the time of a whole episode only those that were cleared can have ended: that is left out.
 """
 
 import argparse
@@ -12,17 +13,19 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+EPISODE_STEPS = 1200
 SHARE = 0.9
 
 
 def curve(run: Path) -> dict[str, list[float]]:
     """Read a run's log: minutes, steps, share of boards cleared, share of ink left."""
+    first = EPISODE_STEPS * json.loads((run / "config.json").read_text(encoding="utf-8"))["num_envs"]
     log = EventAccumulator(str(run))
     log.Reload()
     minutes = {event.step: event.value for event in log.Scalars("time/minutes")}
     cleared = {event.step: event.value for event in log.Scalars("episode/success")}
     left = {event.step: event.value for event in log.Scalars("episode/ink_left")}
-    steps = sorted(cleared)
+    steps = sorted(step for step in cleared if step > first)
     return {
         "steps": steps,
         "minutes": [minutes[step] for step in steps],
@@ -64,6 +67,12 @@ def main() -> None:
     parser.add_argument("runs", nargs="+", type=Path, help="folders of runs, as --out of contactsafe train named them")
     parser.add_argument("--out", type=Path, default=Path("learning.png"), help="picture to write")
     arguments = parser.parse_args()
+    names = [run.name for run in arguments.runs]
+    if len(set(names)) < len(names):
+        parser.error(f"two runs are called alike ({', '.join(names)}); name their folders apart")
+    missing = [run for run in arguments.runs if not (run / "config.json").exists()]
+    if missing:
+        parser.error(f"{missing[0]} holds no run (config.json); give folders that `contactsafe train` wrote")
     curves = {run.name: curve(run) for run in arguments.runs}
     print(f"| run | {SHARE:.0%} of the last hundred training boards | whole run | held-out boards, 99 % of ink gone |")
     print("|---|---|---|---|")

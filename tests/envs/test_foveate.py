@@ -1,9 +1,12 @@
 """What a foveated picture says: where ink is from here, however little of it, whatever camera looks."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 from tests.learning.fakes import BOARD, camera_homography
 
 from contactsafe.envs.foveate import FEATURES, RINGS, SCALES_M, SECTORS, foveate, ground_of
@@ -29,8 +32,8 @@ def look(mask, tool=(0.0, 0.0)):
     return foveate(mask, (BOARD + tool)[None], GROUND)[0]
 
 
-def soft_nearest(picture, k):
-    """Vector to ink at the k-th scale, m."""
+def patch(picture, k):
+    """Vector to the patch about the nearest ink at the k-th scale, m."""
     x, y, distance = picture[GRID + 4 * k : GRID + 4 * k + 3]
     length = np.hypot(x, y)
     return 0.1 * distance * np.array([x, y]) / max(length, 1e-9)
@@ -47,15 +50,25 @@ def test_a_single_pixel_anywhere_is_seen_and_placed_within_its_own_size(speck, t
     away = np.subtract(speck, tool)
     assert picture[:GRID].sum() > 0.3
     for k in range(len(SCALES_M)):
-        assert np.linalg.norm(soft_nearest(picture, k) - away) < 0.005
+        assert np.linalg.norm(patch(picture, k) - away) < 0.005
 
 
 @given(places, places, places)
 def test_the_finest_scale_says_the_nearest(first, second, tool):
     near, far = sorted((np.subtract(p, tool) for p in (first, second)), key=np.linalg.norm)
     if np.linalg.norm(far) > np.linalg.norm(near) + 0.05:
-        found = soft_nearest(look(mask_of(first, second), tool), 0)
+        found = patch(look(mask_of(first, second), tool), 0)
         assert np.linalg.norm(found - near) < 0.01
+
+
+@given(st.floats(0.0, 2 * np.pi), st.floats(0.06, 0.12))
+def test_between_two_patches_as_far_away_it_says_one_of_them(angle, distance):
+    """Their mean lies under the tool, where there is nothing: who believed it would stay there."""
+    either = distance * np.array([np.cos(angle), np.sin(angle)])
+    picture = look(mask_of(either, -either))
+    for k in (0, 1):
+        found = patch(picture, k)
+        assert min(np.linalg.norm(found - either), np.linalg.norm(found + either)) < 0.01
 
 
 def test_the_grid_turns_with_the_ink():
@@ -79,7 +92,7 @@ def test_another_camera_sees_ink_in_the_same_place(speck, tool):
     mask = np.full((1, 128, 128), 255, np.uint8)
     mask[0, int(v / w), int(u / w)] = 0
     other = foveate(mask, (BOARD + tool)[None], ground_of(aside, (128, 128)))[0]
-    assert np.linalg.norm(soft_nearest(other, 0) - soft_nearest(look(mask_of(speck), tool), 0)) < 0.01
+    assert np.linalg.norm(patch(other, 0) - patch(look(mask_of(speck), tool), 0)) < 0.01
 
 
 def test_area_of_a_pixel_is_that_of_its_outline_on_the_board():
@@ -89,6 +102,17 @@ def test_area_of_a_pixel_is_that_of_its_outline_on_the_board():
     x, y = (corners[:, :2] / corners[:, 2:]).T
     outline = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
     assert GROUND.area[v * 128 + u] == pytest.approx(outline, rel=1e-3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_threads_see_the_same(n):
+    rng = np.random.default_rng(n)
+    masks = np.where(rng.random((n, 128, 128)) < 0.01, 0, 255).astype(np.uint8)
+    tools = BOARD + rng.uniform(-0.1, 0.1, (n, 2))
+    with ThreadPoolExecutor(2) as threads:
+        assert_array_equal(foveate(masks, tools, GROUND, threads), foveate(masks, tools, GROUND))
+        with pytest.raises(InvalidInputError, match=f"one row of x, y for each of {n} masks"):
+            foveate(masks, np.zeros((n + 1, 2)), GROUND, threads)
 
 
 def test_what_cannot_be_looked_at_is_refused():

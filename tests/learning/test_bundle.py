@@ -213,8 +213,8 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
     path.write_text(whole)
     rewrite(bundle, format=99)
-    assert refusal(bundle) == f"{path} has format 99, this version reads 2; export it anew, or upgrade"
-    rewrite(bundle, format=2, rate_hz="60")
+    assert refusal(bundle) == f"{path} has format 99, this version reads 3; export it anew, or upgrade"
+    rewrite(bundle, format=3, rate_hz="60")
     assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
     rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
     assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"

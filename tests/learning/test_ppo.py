@@ -198,6 +198,18 @@ def test_without_an_encoder_it_says_what_to_do(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_eyes_of_another_version_are_refused(vae, tmp_path):
+    """Their numbers would be read as something else."""
+    text = (vae / "vae.json").read_text(encoding="utf-8")
+    (tmp_path / "vae.json").write_text(text.replace('"format": 3', '"format": 2'), encoding="utf-8")
+    (tmp_path / "encoder.onnx").write_bytes(b"")
+    with pytest.raises(InvalidInputError) as error:
+        train_policy(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
+    assert str(error.value) == (
+        f"{tmp_path / 'vae.json'} has format 2, this version reads 3; run `contactsafe train vae --out {tmp_path}` anew"
+    )
+
+
 def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
     """With the ink's place readable off the observation, a few thousand steps must pay."""
     config = ppo_config(

@@ -5,6 +5,7 @@ code of one, loses the last speck; a grid in the logarithm of the distance keeps
 outright. Nothing here is learned.
 """
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.envs.rectify import INK_BELOW
 from contactsafe.errors import InvalidInputError
-from contactsafe.robot.words import BARE, WORD, words_of
+from contactsafe.sim.words import places_unlike
 
 RINGS = 10
 SECTORS = 16
@@ -21,7 +22,7 @@ RADIUS_M = (0.01, 0.45)
 """Distances of the first and the last ring's middle; nearer counts as the first, farther as the last."""
 
 SCALES_M = (0.01, 0.03, 0.1)
-"""Ink this much farther away than the nearest weighs 1/e in the soft nearest ink."""
+"""Ink this far from the nearest ink weighs 1/e in the patch about it."""
 
 AMOUNT_M2 = 2e-5
 """Ink area that counts as one, about a camera pixel: amounts are given as log(1 + area / AMOUNT_M2)."""
@@ -31,6 +32,9 @@ NEAR_M = 0.02
 
 FEATURES = RINGS * SECTORS + 4 * len(SCALES_M) + 1
 """Numbers in a foveated picture."""
+
+SHARES = 2
+"""Into which a batch is split for threads."""
 
 
 class Ground(NamedTuple):
@@ -77,18 +81,22 @@ def ground_of(homography, size):
     return Ground(place.reshape(-1, 2), np.ascontiguousarray(area.reshape(-1)))
 
 
-def foveate(masks, tool_positions, ground):
+def foveate(masks, tool_positions, ground, threads=None):
     """Say where ink is as seen from each tool.
 
     Features, in this order: log-amount of ink in each of RINGS × SECTORS cells about the tool, rings evenly spaced in
     the logarithm of distance, sectors from world x towards y, each pixel shared between the cells about it; for each
-    of SCALES_M the soft nearest ink: direction (2), fading below NEAR_M, its distance / 0.1 m, and the log-amount of
-    ink that goes into it; log-amount of all ink in sight. All are 0 where no ink is in sight.
+    of SCALES_M the middle of the patch about the nearest ink: direction (2), fading below NEAR_M, its distance / 0.1 m,
+    and the log-amount of ink that goes into it; log-amount of all ink in sight. All are 0 where no ink is in sight.
+
+    A patch is about one place, so that of two patches as far away on either side the finer scales say the one or the
+    other. Their mean would lie under the tool, and a policy that believed it would stay there.
 
     Args:
         masks: camera masks, (N, height, width) or (N, height, width, 1), uint8: 0 is ink, 255 all else.
         tool_positions: tool points in world, (N, 2) or wider, m; only x and y are read.
         ground: `Ground` of the camera.
+        threads: a ThreadPoolExecutor that shares the work; None to do it here.
 
     Returns:
         (N, FEATURES) float32.
@@ -108,46 +116,55 @@ def foveate(masks, tool_positions, ground):
         )
     features = np.zeros((len(masks), FEATURES), dtype=np.float32)
     flat = np.ascontiguousarray(masks).reshape(len(masks), -1)
-    _foveate_all(flat, np.ascontiguousarray(tool_xy[:, :2]), ground.place, ground.area, features)
+    tool_xy = np.ascontiguousarray(tool_xy[:, :2])
+    if threads is None:
+        _foveate_some(0, len(masks), flat, tool_xy, ground.place, ground.area, features)
+        return features
+    bounds = np.linspace(0, len(masks), min(len(masks), SHARES) + 1).astype(int).tolist()
+    shares = [
+        threads.submit(_foveate_some, start, stop, flat, tool_xy, ground.place, ground.area, features)
+        for start, stop in itertools.pairwise(bounds)
+    ]
+    for share in shares:
+        share.result()
     return features
 
 
 @compiled(nogil=True)
-def _foveate_all(masks, tool_xy, place, area, features):
-    for n in range(masks.shape[0]):
+def _foveate_some(start, stop, masks, tool_xy, place, area, features):
+    for n in range(start, stop):
         if math.isfinite(tool_xy[n, 0]) and math.isfinite(tool_xy[n, 1]):
             _foveate_one(masks[n], tool_xy[n, 0], tool_xy[n, 1], place, area, features[n])
 
 
 @compiled(nogil=True)
 def _foveate_one(mask, tool_x, tool_y, place, area, out):
-    pixels = np.empty(mask.shape[0], dtype=np.int32)
-    count = 0
+    dark = np.empty(mask.shape[0], dtype=np.int32)
+    pixels = dark[: places_unlike(mask, np.uint8(255), dark)]
+    count, near = 0, 0
     nearest = math.inf
-    words = words_of(mask)
-    for w in range(words.shape[0] + 1):
-        if w < words.shape[0] and words[w] == BARE:
-            continue
-        for p in range(WORD * w, min(WORD * (w + 1), mask.shape[0])):
-            if mask[p] < INK_BELOW and area[p] > 0.0:
-                pixels[count] = p
-                count += 1
-                nearest = min(nearest, (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2)
+    for p in pixels:
+        if mask[p] < INK_BELOW and area[p] > 0.0:
+            pixels[count] = p
+            count += 1
+            distance = (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2
+            if distance < nearest:
+                near, nearest = p, distance
     if count == 0:
         return
-    nearest = math.sqrt(nearest)
-    grid, soft, total = np.zeros((RINGS, SECTORS)), np.zeros((len(SCALES_M), 3)), 0.0
+    grid, patches, total = np.zeros((RINGS, SECTORS)), np.zeros((len(SCALES_M), 3)), 0.0
     for p in pixels[:count]:
         dx, dy = place[p, 0] - tool_x, place[p, 1] - tool_y
         distance = math.sqrt(dx * dx + dy * dy)
         total += area[p]
         _share_out(dx, dy, distance, area[p], grid)
+        away = math.sqrt((place[p, 0] - place[near, 0]) ** 2 + (place[p, 1] - place[near, 1]) ** 2)
         for k in range(len(SCALES_M)):
-            weight = area[p] * math.exp((nearest - distance) / SCALES_M[k])
-            soft[k, 0] += weight * dx
-            soft[k, 1] += weight * dy
-            soft[k, 2] += weight
-    _write(grid, soft, total, out)
+            weight = area[p] * math.exp(-away / SCALES_M[k])
+            patches[k, 0] += weight * dx
+            patches[k, 1] += weight * dy
+            patches[k, 2] += weight
+    _write(grid, patches, total, out)
 
 
 @compiled(nogil=True)
@@ -167,17 +184,17 @@ def _share_out(dx, dy, distance, amount, grid):
 
 
 @compiled(nogil=True)
-def _write(grid, soft, total, out):
+def _write(grid, patches, total, out):
     k = 0
     for r in range(RINGS):
         for s in range(SECTORS):
             out[k] = math.log1p(grid[r, s] / AMOUNT_M2)
             k += 1
-    for scale in range(soft.shape[0]):
-        x, y = soft[scale, 0] / soft[scale, 2], soft[scale, 1] / soft[scale, 2]
+    for scale in range(patches.shape[0]):
+        x, y = patches[scale, 0] / patches[scale, 2], patches[scale, 1] / patches[scale, 2]
         distance = math.sqrt(x * x + y * y)
         out[k], out[k + 1] = x / (distance + NEAR_M), y / (distance + NEAR_M)
         out[k + 2] = distance / 0.1
-        out[k + 3] = math.log1p(soft[scale, 2] / AMOUNT_M2)
+        out[k + 3] = math.log1p(patches[scale, 2] / AMOUNT_M2)
         k += 4
     out[k] = math.log1p(total / AMOUNT_M2)

@@ -11,7 +11,7 @@ class PhotographSight:
     """Cameras over the boards of some worlds, and what finds the ink in their pictures.
 
     It keeps no state: light, pen and camera of an episode follow from `light` of its `task_dtype` record, the noise of
-    a picture from that and `steps`.
+    a picture from that and `steps`. Where the arm hides the board is known by the encoders, as on a real arm.
 
     Args:
         worlds: whose boards are seen.
@@ -34,5 +34,5 @@ class PhotographSight:
         """Put what is seen in the photographs of worlds start to stop in place of their masks."""
         for i in range(start, stop):
             photographer = self._photographers[i]
-            hidden = photographer.hidden(photographer.solids(self._worlds.datas[i]))
+            hidden = photographer.hidden(photographer.solids_at(self._worlds.plants[i]["q_seen"]))
             self._worlds.masks[i] = self._segmenter.segment(self.photograph(i, tasks[i]), hidden)

@@ -72,7 +72,7 @@ def step_tasks(
 
 @compiled
 def judge(i, plant, controller, cells, report, cameras, ledger, rewards, task, mask):
-    """Score the step that world i has run and look at it."""
+    """Score the step that world i has run and look at it; `ledger` is that of all worlds, the rest is this one's."""
     camera = camera_at(cameras, plant.camera)
     strike_out(ledger, i, cells, camera.pixels)
     ink, distance = nearest_ink(ledger, i, cells, plant.origin, plant.cell, tool_position(plant))

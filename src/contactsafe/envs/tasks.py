@@ -129,12 +129,15 @@ class WipingTasks:
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
         task["light"] = 0 if self._sight is None else rng.integers(2**31)
-        self.observe(i)
+        self._look_first(i)
 
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
+        self.worlds.enter_ink(i)
+        self._look_first(i)
+
+    def _look_first(self, i: int) -> None:
         worlds, task = self.worlds, self.tasks[i]
-        worlds.enter_ink(i)
         camera = camera_at(worlds.cameras, worlds.plants[i]["camera"])
         observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ledger.shown[i], task, worlds.masks[i])
         if self._sight is not None:

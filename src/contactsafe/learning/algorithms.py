@@ -96,12 +96,14 @@ class SacConfig(PolicyConfig):
     algorithm: ClassVar[str] = "sac"
 
     out: Path = Path("runs/sac")
+    num_envs: int = 32
+    rollout_steps: int = 128
     batch: int = 256
     net: tuple[int, ...] = (256, 256)
     buffer: int = 300_000
     learning_starts: int = 10_000
     update_every: int = 1
-    gradient_steps: int = 8
+    gradient_steps: int = 4
     target_share: float = 0.005
     entropy_start: float = 0.1
 

@@ -19,7 +19,7 @@ from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
 from contactsafe.learning.scan import Scan
 
-FORMAT = 2
+FORMAT = 3
 """Version of the folder's layout; raised when an older reader would misread it."""
 
 MANIFEST = "bundle.json"

@@ -5,12 +5,15 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import onnxruntime
 
-from contactsafe.envs.foveate import FEATURES, foveate, ground_of
+from contactsafe.envs.foveate import FEATURES, SHARES, foveate, ground_of
 from contactsafe.envs.rectify import rectify
 from contactsafe.errors import BundleError, InvalidInputError
 
 LEARNED = ("tool", "paper")
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
+
+EYES_FORMAT = 3
+"""Version of what vae.json holds and of what its numbers mean."""
 
 REPRESENTATIONS = ("foveated", *LEARNED)
 
@@ -49,13 +52,13 @@ class Perception:
         window_m: side of the tool's window, m; read for "tool".
         size: pixels along a side of what the encoder takes, or of the camera's mask.
         homography: board plane to camera pixels, (3, 3); not read for "paper".
-        threads: for "foveated", each with its share of a batch; a session has its own.
+        share: whether threads of its own share a batch of foveated pictures; not for a control loop. `close` ends them.
 
     Attributes:
         latent_size: how many numbers come out.
     """
 
-    def __init__(self, session, representation, window_m, size, homography, threads=1):
+    def __init__(self, session, representation, window_m, size, homography, share=False):
         if representation not in REPRESENTATIONS:
             allowed = ", ".join(REPRESENTATIONS)
             raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
@@ -65,7 +68,7 @@ class Perception:
         self.size = size
         self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
         self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
-        self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._threads = ThreadPoolExecutor(SHARES) if share and self.ground is not None else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
     def __call__(self, masks, tool_positions):
@@ -82,7 +85,7 @@ class Perception:
             InvalidInputError: a shape or type differs.
         """
         if self.ground is not None:
-            return self._foveated(masks, tool_positions)
+            return foveate(masks, tool_positions, self.ground, self._threads)
         if self.representation == "tool":
             views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
         else:
@@ -95,10 +98,7 @@ class Perception:
                 )
         return self.session.run(["latent"], {"mask": views})[0]
 
-    def _foveated(self, masks, tool_positions):
-        if self._threads is None or len(masks) < self._threads._max_workers:
-            return foveate(masks, tool_positions, self.ground)
-        shares = np.array_split(np.arange(len(masks)), self._threads._max_workers)
-        shares = [slice(share[0], share[-1] + 1) for share in shares]
-        seen = self._threads.map(lambda share: foveate(masks[share], tool_positions[share], self.ground), shares)
-        return np.concatenate(list(seen))
+    def close(self):
+        """End the threads."""
+        if self._threads is not None:
+            self._threads.shutdown()

@@ -82,7 +82,15 @@ class PolicyConfig:
 
     def __post_init__(self):
         """Refuse numbers with which nothing can be trained."""
-        for name in ("num_envs", "total_steps", "rollout_steps", "batch", "action_repeat", "threads"):
+        for name in (
+            "num_envs",
+            "total_steps",
+            "rollout_steps",
+            "batch",
+            "action_repeat",
+            "threads",
+            "encoder_threads",
+        ):
             if getattr(self, name) < 1:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 1 or more")
         for name in ("max_minutes", "evaluate_episodes", "seed"):

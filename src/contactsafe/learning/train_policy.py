@@ -14,7 +14,7 @@ from contactsafe.learning.checkpoints import plain, prepare_folder, write_json
 from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.observation import ObservationScaling
-from contactsafe.learning.perception import LEARNED, Perception, open_session
+from contactsafe.learning.perception import EYES_FORMAT, LEARNED, Perception, open_session
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.recorder import Curves, Recorder
 from contactsafe.learning.run import Run, load_run
@@ -73,12 +73,18 @@ class _Eyes:
             text = (folder / "vae.json").read_bytes()
             vae = json.loads(text)
             encoder = (folder / "encoder.onnx").read_bytes() if vae["representation"] in LEARNED else None
-            return cls(encoder, vae, digest((encoder or b"") + text))
+            version = vae["format"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InvalidInputError(
                 f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); "
                 f"run `contactsafe train vae --out {folder}` first"
             ) from error
+        if version != EYES_FORMAT:
+            raise InvalidInputError(
+                f"{folder / 'vae.json'} has format {version!r}, this version reads {EYES_FORMAT}; "
+                f"run `contactsafe train vae --out {folder}` anew"
+            )
+        return cls(encoder, vae, digest((encoder or b"") + text))
 
 
 def _encoded(raw_env, eyes, config):
@@ -87,7 +93,7 @@ def _encoded(raw_env, eyes, config):
     if eyes.encoder is not None:
         session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
     view = (vae["representation"], vae["window_m"], vae["size"])
-    perception = Perception(session, *view, _homography(raw_env), config.encoder_threads)
+    perception = Perception(session, *view, _homography(raw_env), share=True)
     scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
     scan = Scan(config.scan, rate_hz=config.rate_hz)
     return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, scan)

@@ -22,7 +22,7 @@ from contactsafe.learning.checkpoints import (
 from contactsafe.learning.datasets import make_dataset
 from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
-from contactsafe.learning.perception import Perception
+from contactsafe.learning.perception import EYES_FORMAT, Perception
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
 
 HELD_OUT_SEED = 1_000_003
@@ -155,7 +155,7 @@ def _report_foveated(config, sample_masks, homography):
 
 def _description(config, size, mean, std):
     return {
-        "format": 2,
+        "format": EYES_FORMAT,
         "representation": config.representation,
         "window_m": config.window_m,
         "size": size,

@@ -160,8 +160,9 @@ class EncodedVecEnv(VecEnv):
         self.finished.extend(episodes)
 
     def close(self):
-        """Close the environment below."""
+        """Close the environment below, and the eyes."""
         self.env.close()
+        getattr(self.perception, "close", lambda: None)()
 
     def get_attr(self, attr_name, indices=None):
         """Read an attribute of the environment below, the same for each index."""

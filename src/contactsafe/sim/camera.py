@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.errors import InvalidInputError
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
@@ -19,6 +20,8 @@ from contactsafe.sim.ink import count_shown, list_cells
 from contactsafe.sim.whiteboard import Whiteboard
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
+
+_MOST_CELLS, _MOST_ROWS = 2**16 - 1, 2**15 - 1  # what the counts and numbers of a `Ledger` hold
 
 
 def camera_axes(camera: Camera) -> np.ndarray:
@@ -127,6 +130,12 @@ def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:
         known = (pixels[..., :k] == pixel[..., None]).any(axis=-1)
         pixels[..., k] = np.where(known, -1, pixel)
     pixels = -np.sort(-pixels, axis=-1)
+    most = np.bincount(pixels[pixels >= 0], minlength=1).max()
+    if most > _MOST_CELLS or max(board.cells.shape) > _MOST_ROWS:
+        raise InvalidInputError(
+            f"one pixel of the camera shows {most} cells of a board of {board.cells.shape}; at most {_MOST_CELLS} and "
+            f"{_MOST_ROWS} rows can be counted: make the board's cell larger"
+        )
     return np.where(pixels[..., None] < 0, -1, np.stack([pixels // size, pixels % size], axis=-1)).astype(np.int16)
 
 
@@ -163,7 +172,14 @@ def render_mask(camera, cells, plant, out):
 
 @compiled(nogil=True)
 def draw_mask(camera, shown, plant, out):
-    """The same from the numbers of cells that the pixels show, uint16 (size, size), as a `Ledger` keeps them."""
+    """Draw a mask from what a `Ledger` keeps.
+
+    Args:
+        camera: `CameraTables`.
+        shown: in how many cells that are not clean each pixel has a part, uint16 (size, size).
+        plant: `plant_dtype` record, for where the arm's shapes are.
+        out: uint8, (size, size); overwritten.
+    """
     out[:] = OTHER_PIXEL
     marked = _mark(shown, out)
     xpos, xmat = view2(plant.geom_xpos, plant.ngeom, 3), view2(plant.geom_xmat, plant.ngeom, 9)

@@ -10,29 +10,29 @@ from typing import NamedTuple
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.words import WORD, words_of
 from contactsafe.sim.whiteboard import CLEAN, INK
+from contactsafe.sim.words import places_unlike
 
 
 class Ledger(NamedTuple):
-    """What lies on N boards.
+    """What lies on N boards, as it was when they were last entered, less what was wiped until they were last looked at.
 
     Attributes:
         cells: row and column of each cell that is not clean, in order, int16 (n, rows · columns, 2).
-        count: how many those are, (n,).
+        entries: how many those are, (n,).
         shown: in how many of them each pixel has a part, uint16 (n, size, size).
     """
 
     cells: np.ndarray
-    count: np.ndarray
+    entries: np.ndarray
     shown: np.ndarray
 
 
 def empty_ledger(n: int, cells: int, size: int) -> Ledger:
-    """Make a ledger of n clean boards of so many cells, seen by cameras of size × size pixels."""
+    """Make a `Ledger` of n clean boards of so many cells, seen by cameras of size × size pixels."""
     return Ledger(
         cells=np.zeros((n, cells, 2), dtype=np.int16),
-        count=np.zeros(n, dtype=np.int64),
+        entries=np.zeros(n, dtype=np.int64),
         shown=np.zeros((n, size, size), dtype=np.uint16),
     )
 
@@ -47,8 +47,8 @@ def enter(ledger, i, cells, pixels):
         cells: the board's, uint8, (rows, columns).
         pixels: of the camera that looks at it, see `CameraTables`.
     """
-    ledger.count[i] = list_cells(cells, ledger.cells[i])
-    count_shown(pixels, ledger.cells[i, : ledger.count[i]], ledger.shown[i])
+    ledger.entries[i] = list_cells(cells, ledger.cells[i])
+    count_shown(pixels, ledger.cells[i, : ledger.entries[i]], ledger.shown[i])
 
 
 @compiled
@@ -56,30 +56,24 @@ def strike_out(ledger, i, cells, pixels):
     """Take out of board i's entries what has been wiped since; arguments as for `enter`."""
     listed, shown = ledger.cells[i], ledger.shown[i]
     kept = 0
-    for m in range(ledger.count[i]):
+    for m in range(ledger.entries[i]):
         row, column = listed[m, 0], listed[m, 1]
         if cells[row, column] == CLEAN:
             _add(shown, pixels, row, column, -1)
         else:
             listed[kept, 0], listed[kept, 1] = row, column
             kept += 1
-    ledger.count[i] = kept
+    ledger.entries[i] = kept
 
 
 @compiled
 def list_cells(cells, out):
     """Write row and column of each cell that is not clean to `out`, (rows · columns, 2); give their number."""
     columns = cells.shape[1]
-    flat = cells.reshape(-1)
-    words = words_of(flat)
-    count = 0
-    for w in range(words.shape[0] + 1):
-        if w < words.shape[0] and words[w] == 0:
-            continue
-        for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
-            if flat[p] != CLEAN:
-                out[count, 0], out[count, 1] = p // columns, p % columns
-                count += 1
+    numbers = np.empty(cells.size, dtype=np.int32)
+    count = places_unlike(cells.reshape(-1), np.uint8(CLEAN), numbers)
+    for m in range(count):
+        out[m, 0], out[m, 1] = numbers[m] // columns, numbers[m] % columns
     return count
 
 
@@ -119,7 +113,7 @@ def nearest_ink(ledger, i, cells, origin, cell, position):
     count = 0
     best = math.inf
     px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
-    for m in range(ledger.count[i]):
+    for m in range(ledger.entries[i]):
         row, column = listed[m, 0], listed[m, 1]
         if cells[row, column] == INK:
             count += 1

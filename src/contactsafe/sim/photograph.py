@@ -149,6 +149,7 @@ class Photographer:
         middle = PHOTO_PX / 2
         K = np.array([[fine.focal_px, 0.0, middle], [0.0, fine.focal_px, middle], [0.0, 0.0, 1.0]])
         self._projection = K @ np.column_stack([R, -R @ self._eye])
+        self._model, self._posed = model, mujoco.MjData(model)
         self._arm = np.flatnonzero(model.geom_contype == ARM_CONTYPE)
         self._is_box = model.geom_type[self._arm] == mujoco.mjtGeom.mjGEOM_BOX
         self._sizes = model.geom_size[self._arm].copy()
@@ -163,6 +164,12 @@ class Photographer:
     def solids(self, data: mujoco.MjData) -> Solids:
         """Give the arm's shapes where they are."""
         return Solids(self._is_box, self._sizes, data.geom_xpos[self._arm], data.geom_xmat[self._arm].reshape(-1, 3, 3))
+
+    def solids_at(self, q: np.ndarray) -> Solids:
+        """Give the arm's shapes where joint positions q (n,), rad, say that they are."""
+        self._posed.qpos[: len(q)] = q
+        mujoco.mj_kinematics(self._model, self._posed)
+        return self.solids(self._posed)
 
     def hidden(self, solids: Solids) -> np.ndarray:
         """Give what kinematics know of the picture: 255 where the arm stands, uint8 (n, n)."""

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.words import BARE, WORD, copy_picture, words_of
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
 from contactsafe.sim.randomisation import MAX_DELAY_STEPS, Randomisation, draw, draw_dtype
 from contactsafe.sim.snapshot import Part, of_array, put, take
+from contactsafe.sim.words import copy_picture, places_unlike
 from contactsafe.sim.world import Worlds
 
 CAMERAS = 16
@@ -87,6 +87,7 @@ class Variation:
 
     def _apply(self, i: int) -> None:
         self._worlds.plants[i]["camera"] = self.drawn[i]["camera"]
+        self._worlds.boards[i].changed = True  # as another camera sees it
         self._plants[i].apply(self.drawn[i])
 
 
@@ -146,13 +147,10 @@ def _spoil(mask, drawn, random):
     missed, invented = drawn[0].ink_missed, drawn[0].ink_invented
     flat = mask.reshape(-1)
     if missed > 0.0:
-        words = words_of(flat)
-        for w in range(words.shape[0] + 1):
-            if w < words.shape[0] and words[w] == BARE:
-                continue
-            for p in range(WORD * w, min(WORD * (w + 1), flat.shape[0])):
-                if flat[p] == INK_PIXEL and _uniform(random) < missed:
-                    flat[p] = OTHER_PIXEL
+        inked = np.empty(flat.shape[0], dtype=np.int32)
+        for p in inked[: places_unlike(flat, np.uint8(OTHER_PIXEL), inked)]:
+            if _uniform(random) < missed:
+                flat[p] = OTHER_PIXEL
     for _ in range(int(invented + _uniform(random))):
         flat[int(_uniform(random) * flat.shape[0])] = INK_PIXEL
 

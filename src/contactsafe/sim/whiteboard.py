@@ -17,7 +17,8 @@ class Whiteboard:
 
     Attributes:
         cells: what lies in each cell, uint8, (rows along x, columns along y).
-        changed: whether anything was drawn, laid or cleared since this was last set to false.
+        changed: whether anything was drawn, laid or cleared since this was last set to false. Who writes ink into the
+            cells by other means than the methods here sets it; who takes ink away need not.
     """
 
     def __init__(self, config: BoardConfig):
@@ -26,9 +27,12 @@ class Whiteboard:
         self.changed = True
         x, y, _ = config.centre
         self.origin = np.array([x - config.size[0] / 2, y - config.size[1] / 2])
-        half = config.ink_size / 2
-        self._ink_rows = slice(*(round((x + s * half - self.origin[0]) / config.cell) for s in (-1, 1)))
-        self._ink_columns = slice(*(round((y + s * half - self.origin[1]) / config.cell) for s in (-1, 1)))
+        side = round(config.ink_size / config.cell)
+        first = [
+            round((middle - config.ink_size / 2 - corner) / config.cell)
+            for middle, corner in zip((x, y), self.origin, strict=True)
+        ]
+        self._ink_rows, self._ink_columns = (slice(start, start + side) for start in first)
 
     @property
     def ink_cells(self) -> int:

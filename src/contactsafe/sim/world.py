@@ -91,7 +91,8 @@ class Worlds:
         masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
         camera: `CameraTables` as calibrated.
         cameras: those that look, side by side; `plants["camera"]` says which one at which world.
-        ledger: `Ledger` of the boards and the cameras that look at them.
+        ledger: `Ledger` of the boards and the cameras that look at them; `enter_changed` brings it up to date with what
+            was drawn, tasks with what was wiped.
         homography: of board plane to mask pixels, (3, 3).
         no_trace: an empty trace, for `run_worlds` and its like.
     """
@@ -177,7 +178,7 @@ class Worlds:
         self.boards[i].changed = False
 
     def enter_changed(self) -> None:
-        """The same for every board that was drawn on since."""
+        """Do so for every board that says it has changed."""
         for i, board in enumerate(self.boards):
             if board.changed:
                 self.enter_ink(i)
@@ -219,7 +220,7 @@ class Worlds:
             self._threads.shutdown()
 
     def draw_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Draw the sensors' noise for one step of worlds start to stop; gives that of all, (n, MAX_TICKS, channels)."""
+        """Draw the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
         for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
             rng.standard_normal(out=noise)
         return self._noise
