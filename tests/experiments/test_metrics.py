@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from contactsafe.experiments.disturbance import PUSH_N, PUSH_POINTS, PUSH_S, deviation_metrics, push_force
-from contactsafe.experiments.joint_safety import contact_metrics
+from contactsafe.experiments.joint_safety import _worth_showing, contact_metrics
+from contactsafe.experiments.results import Recording
 from contactsafe.experiments.task_safety import wiping_metrics
 from contactsafe.sim.records import trace_dtype
 
@@ -109,3 +110,14 @@ def test_pushes_are_level_of_one_size_and_their_seeds():
         assert len({tuple(force) for force in forces}) == 50
         assert np.array_equal(forces[3], push_force(3, link))
     assert PUSH_S[1] - PUSH_S[0] >= 1.0
+
+
+def test_shown_is_the_first_seed_with_which_every_arm_met_the_obstacle():
+    def run(seed, force):
+        made = trace(5)
+        made["obstacle_force"][2] = force
+        return Recording("bottle", "safe", seed, made, np.zeros((1, 2, 2), np.uint8), 200)
+
+    runs = {4: [run(4, 9.0), run(4, 0.0)], 5: [run(5, 9.0), run(5, 9.0)], 6: [run(6, 9.0), run(6, 9.0)]}
+    assert [recording.seed for recording in _worth_showing(runs)] == [5, 5]
+    assert [recording.seed for recording in _worth_showing({4: runs[4]})] == [4, 4]

@@ -101,7 +101,7 @@ class Experiment:
         name: as on the command line, such as 'joint-safety'.
         question: what it asks, in a sentence.
         trials: all of them.
-        recordings: of the first seed, one for each scenario and controller that is to be drawn.
+        recordings: of one seed, one for each scenario and controller that is to be drawn.
         tables: what else there is to say.
     """
 

@@ -106,7 +106,8 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
             Panel("residual (N m)", lambda run: _largest(run.trace["residual"])),
         ]
         drawn = [_titled(name, plotter.plot(experiment, name, panels)) for name in names]
-        said = "Force of the obstacle on the arm; external torque and observer's residual, the largest of all joints."
+        said = "Force of the obstacle on the arm; external torque and observer's residual, the largest of all joints. "
+        said += "Shown is the first seed with which every arm met it, if there is one."
         return _figure(drawn, experiment, said, "plots two")
     if experiment.name == "task-safety":
         single = [
