@@ -1,7 +1,7 @@
 """Which cells of a board are not clean, and which pixels show them: kept from look to look, for wiping only takes away.
 
 A board has ten times as many cells as hold ink, and a mask ten times as many pixels as show any: going through all of
-them sixty times a second costs more than the physics.
+them in every step cost a third as much as its physics and control.
 """
 
 import math
