@@ -11,8 +11,9 @@ from contactsafe.compiled import compiled
 from contactsafe.control.laws import momentum, observer_step, passes_elsewhere, weigh
 from contactsafe.control.records import FREE
 from contactsafe.robot.dynamics import mass_regressor
-from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import dot, matvec, matvec_t
+from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.linalg import dot, matvec_into, matvec_t_into
+from contactsafe.robot.stack import stack_vector
 
 LOST_AFTER_TICKS = 20
 """Unusable measurements in a row after which nothing is known of the torque meanwhile."""
@@ -41,7 +42,7 @@ def start(c):
         state.mass_covariance[j, j] = params.mass_variance[j]
     for i in range(state.gravity_sigma.shape[0]):
         state.gravity_sigma[i] = _gravity_sigma(c, i)
-    state.momentum[:] = momentum(dynamics.M, c.measurement.qd)
+    momentum(dynamics.M, c.measurement.qd, state.momentum)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
@@ -62,8 +63,10 @@ def correct_gravity(c):
     mass_regressor(c.handle, c.dynamics.mass_regressor)
     if c.measurement.has_wrench != 0:
         c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
-    state.unweighed[:] = -matvec(c.dynamics.mass_regressor, state.mass_error)
-    c.dynamics.g -= state.unweighed
+    heavier = matvec_into(c.dynamics.mass_regressor, state.mass_error, stack_vector(state.unweighed.shape[0]))
+    for i in range(heavier.shape[0]):
+        state.unweighed[i] = -heavier[i]
+        c.dynamics.g[i] += heavier[i]
 
 
 @compiled
@@ -76,10 +79,11 @@ def observe(c):
     n = state.tau.shape[0]
     since = params.dt * (1 + state.bad_ticks)
     known = state.bad_ticks <= LOST_AFTER_TICKS
-    p = momentum(dynamics.M, c.measurement.qd)
-    tau_external, rate, ramp = np.empty(n), np.empty(n), state.tau - state.tau_before
-    state.tau_before[:] = state.tau
+    p = momentum(dynamics.M, c.measurement.qd, stack_vector(n))
+    tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
     for i in range(n):
+        ramp[i] = state.tau[i] - state.tau_before[i]
+        state.tau_before[i] = state.tau[i]
         beta = dynamics.g[i] - dynamics.CT_qd[i]
         applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
         rate[i] = (p[i] - state.momentum[i]) / since
@@ -89,7 +93,7 @@ def observe(c):
     if not known:
         return
     if c.measurement.has_wrench != 0 and params.cancel_tool_wrench != 0:
-        tau_tool = matvec_t(dynamics.J, c.measurement.wrench_ee)
+        matvec_t_into(dynamics.J, c.measurement.wrench_ee, tau_tool)
         for i in range(n):
             tau_external[i] -= tau_tool[i]
     observer_step(state.observed, params.observer_share, tau_external)
@@ -118,14 +122,16 @@ def part_tool_from_arm(c, J_bar):
         state.arm_torque[:] = state.residual
         state.arm_torque_trigger[:] = state.residual_trigger
         return
-    wrench = matvec_t(J_bar, state.residual_trigger)
+    tau_tool = stack_vector(n)
+    wrench = matvec_t_into(J_bar, state.residual_trigger, stack_vector(6))
     if not passes_elsewhere(wrench, c.params.tool_radius_m, c.params.tool_moment_nm):
-        state.alarm -= matvec_t(J, wrench)
+        state.alarm -= matvec_t_into(J, wrench, tau_tool)
     if state.mode == FREE:
         observer_step(state.tool_wrench, c.params.tool_share, wrench)
-    tau_tool = matvec_t(J, state.tool_wrench)
-    state.arm_torque[:] = state.residual - tau_tool
-    state.arm_torque_trigger[:] = state.residual_trigger - tau_tool
+    matvec_t_into(J, state.tool_wrench, tau_tool)
+    for i in range(n):
+        state.arm_torque[i] = state.residual[i] - tau_tool[i]
+        state.arm_torque_trigger[i] = state.residual_trigger[i] - tau_tool[i]
 
 
 @compiled
@@ -136,7 +142,7 @@ def set_thresholds(c):
     plus the standard deviation of the gravity torque that is left after weighing.
     """
     state, params = c.state, c.params
-    friction = joint_friction(params.friction, c.measurement.qd)
+    friction = joint_friction_into(params.friction, c.measurement.qd, stack_vector(state.threshold.shape[0]))
     for i in range(state.threshold.shape[0]):
         inertial = abs(state.momentum_rate[i]) + abs(c.dynamics.CT_qd[i])
         unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
@@ -175,4 +181,5 @@ def weigh_links(c):
 def _gravity_sigma(c, i):
     """Standard deviation of what joint i's gravity torque differs from the model's, N m."""
     row = c.dynamics.mass_regressor[i]
-    return math.sqrt(max(dot(row, matvec(c.state.mass_covariance, row)), 0.0))
+    P_row = matvec_into(c.state.mass_covariance, row, stack_vector(row.shape[0]))
+    return math.sqrt(max(dot(row, P_row), 0.0))

@@ -9,8 +9,9 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matmul, matvec, matvec_t, shorten, spd_inverse
+from contactsafe.robot.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t, shorten, spd_inverse
 from contactsafe.robot.rotation import orientation_error
+from contactsafe.robot.stack import stack_matrix, stack_vector
 
 
 @compiled
@@ -30,7 +31,7 @@ def task_inertia(J, M_inv, manipulability_floor, damping_max):
         Λ, (6, 6), kg and kg m²; and J M⁻¹, (6, n).
     """
     J_M_inv = matmul(J, M_inv)
-    inverse = matmul(J_M_inv, J.T)
+    inverse = matmul_into(J_M_inv, J.T, stack_matrix(6, 6))
     w = max(_determinant(inverse), 0.0)
     if w < manipulability_floor:
         damping = damping_max * (1.0 - w / manipulability_floor) ** 2
@@ -45,7 +46,8 @@ def task_inertia(J, M_inv, manipulability_floor, damping_max):
 def _determinant(A):
     """Determinant of a symmetric positive semi-definite matrix, by Cholesky's pivots; 0 where one is not positive."""
     n = A.shape[0]
-    L = A.copy()
+    L = stack_matrix(n, n)
+    L[:] = A
     det = 1.0
     for k in range(n):
         pivot = L[k, k]
@@ -70,7 +72,9 @@ def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
         linear_max: bound on the acceleration asked for, m/s².
         angular_max: rad/s².
     """
-    acceleration = K_task * error
+    acceleration = stack_vector(6)
+    for i in range(6):
+        acceleration[i] = K_task[i] * error[i]
     shorten(acceleration[:3], linear_max)
     shorten(acceleration[3:], angular_max)
     return matvec(Lambda, acceleration)
@@ -86,7 +90,10 @@ def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
         Jdot_qd: J̇ q̇, (6,).
         D_task: damping per unit task inertia, (6,), 1/s.
     """
-    return matvec(Lambda, -D_task * velocity - Jdot_qd)
+    acceleration = stack_vector(6)
+    for i in range(6):
+        acceleration[i] = -D_task[i] * velocity[i] - Jdot_qd[i]
+    return matvec(Lambda, acceleration)
 
 
 @compiled
@@ -150,7 +157,7 @@ def push_along(direction, M_inv, tau_net):
         M_inv: inverse joint inertia, (n, n), 1/(kg m²).
         tau_net: commanded torque less c and g, (n,), N m.
     """
-    M_inv_a = matvec(M_inv, direction)
+    M_inv_a = matvec_into(M_inv, direction, stack_vector(direction.shape[0]))
     return -dot(M_inv_a, tau_net) / dot(direction, M_inv_a)
 
 
@@ -192,9 +199,9 @@ def is_pushed(drop, moved, lever, stiffness):
 
 
 @compiled
-def momentum(M, qd):
-    """Give p = M q̇, (10), (n,), kg m²/s."""
-    return matvec(M, qd)
+def momentum(M, qd, out):
+    """Fill p = M q̇, (10), (n,), kg m²/s, and give it back."""
+    return matvec_into(M, qd, out)
 
 
 @compiled
@@ -234,7 +241,7 @@ def weigh(mass_error, covariance, row, torque, variance, largest):
         variance: of that reading, (N m)².
         largest: relative error that is believed at most, (m,).
     """
-    P_row = matvec(covariance, row)
+    P_row = matvec_into(covariance, row, stack_vector(row.shape[0]))
     share = 1.0 / (dot(row, P_row) + variance)
     for i in range(row.shape[0]):
         mass_error[i] = min(max(mass_error[i] + P_row[i] * share * torque, -largest[i]), largest[i])

@@ -29,8 +29,9 @@ from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_to
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
-from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
+from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.linalg import dot, matmul, matvec_t, matvec_t_into, shorten
+from contactsafe.robot.stack import stack_vector
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST, _NO_TORQUE = 1, 2, 3, 4, 5, 6
 
@@ -262,17 +263,15 @@ def _finish(c, tau):
     tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
     tau += dynamics.g
-    friction = np.zeros(q.shape[0])
+    state.friction[:] = 0.0
     if params.friction_compensation != 0:
-        friction = joint_friction(params.friction, qd)
-        tau += friction
+        tau += joint_friction_into(params.friction, qd, state.friction)
     if not _all_usable(tau):
         _latch(state, _NO_TORQUE)
         tau[:] = state.tau
     out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
     state.tau[:] = tau
-    state.friction[:] = friction
-    given = dot(tau - friction - dynamics.g, qd)
+    given = dot(tau - state.friction - dynamics.g, qd)
     state.tank_j = min(state.tank_j + params.dt * (params.tank_power_w - given), params.tank_j)
     out.torque[:] = tau
     out.residual[:] = state.residual

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import cross_into, dot, spd_inverse
+from contactsafe.robot.linalg import cross_into, dot, matvec_into, spd_inverse
 from contactsafe.robot.native import (
     mj_comPos,
     mj_comVel,
@@ -20,6 +20,7 @@ from contactsafe.robot.native import (
     view1,
     view2,
 )
+from contactsafe.robot.stack import stack_vector
 
 _VIEWED = (
     "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot",
@@ -125,7 +126,7 @@ def _gravity(handle, n, g):
     subtree_mass = view1(handle.body_subtreemass, handle.nbody)
     xanchor = view2(handle.xanchor, n, 3)
     xaxis = view2(handle.xaxis, n, 3)
-    arm, weight, torque = np.empty(3), np.empty(3), np.empty(3)
+    arm, weight, torque = stack_vector(3), stack_vector(3), stack_vector(3)
     for i in range(n):
         body = handle.first_body + i
         for k in range(3):
@@ -145,7 +146,7 @@ def mass_regressor(handle, out):
     n = out.shape[0]
     com, mass = view2(handle.xipos, handle.nbody, 3), view1(handle.body_mass, handle.nbody)
     xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
-    arm, weight, torque = np.empty(3), np.empty(3), np.empty(3)
+    arm, weight, torque = stack_vector(3), stack_vector(3), stack_vector(3)
     out[:] = 0.0
     for body in range(handle.first_body, handle.nbody):
         link = min(body - handle.first_body, n)
@@ -180,7 +181,8 @@ def _coriolis_transpose(handle, n, CT_qd):
     cvel = view2(handle.cvel, handle.nbody, 6)
     cinert = view2(handle.cinert, handle.nbody, 10)
     cdof_dot = view2(handle.cdof_dot, n, 6)
-    momentum = np.zeros(6)
+    momentum = stack_vector(6)
+    momentum[:] = 0.0
     for body in range(handle.nbody - 1, handle.first_body - 1, -1):
         _inertia_times(cinert[body], cvel[body], momentum)
         i = body - handle.first_body
@@ -199,11 +201,12 @@ def _jacobian_rate(handle, n, out):
     v = view2(handle.cvel, handle.nbody, 6)[handle.tool_body]
     tool = view2(handle.site_xpos, handle.site + 1, 3)[handle.site]
     centre = view2(handle.subtree_com, 2, 3)[1]
-    a, r = np.zeros(6), np.empty(3)
+    a, r = stack_vector(6), stack_vector(3)
+    a[:] = 0.0
     for i in range(n):
         for k in range(6):
             a[k] += cdof_dot[i, k] * qvel[i]
-    v_point, turn, swing = np.empty(3), np.empty(3), np.empty(3)
+    v_point, turn, swing = stack_vector(3), stack_vector(3), stack_vector(3)
     for k in range(3):
         r[k] = tool[k] - centre[k]
     cross_into(v[:3], r, v_point)
@@ -239,9 +242,5 @@ def update_dynamics(handle, q, qd, out):
     _tool_frame(handle, out.position, out.rotation)
     _tool_jacobian(handle, out.J)
     _jacobian_rate(handle, n, out.Jdot_qd)
-    for i in range(6):
-        s = 0.0
-        for j in range(n):
-            s += out.J[i, j] * qd[j]
-        out.velocity[i] = s
+    matvec_into(out.J, qd, out.velocity)
     return spd_inverse(out.M, out.M_inv)

@@ -9,18 +9,21 @@ from contactsafe.compiled import compiled
 
 @compiled
 def joint_friction(parameters, qd):
-    """Give the torque that friction takes from each joint.
+    """Give the torque that friction takes from each joint, (n,), N m; see `joint_friction_into`."""
+    return joint_friction_into(parameters, qd, np.empty(qd.shape[0]))
+
+
+@compiled
+def joint_friction_into(parameters, qd, out):
+    """Fill the torque that friction takes from each joint, and give it back.
 
     φ1/(1 + exp(−φ2 (q̇ + φ3))) − φ1/(1 + exp(−φ2 φ3)); Gaz et al. 2019, eq. (10).
 
     Args:
         parameters: φ1 N m, φ2 s/rad, φ3 rad/s, (n, 3).
         qd: joint velocity, (n,), rad/s.
-
-    Returns:
-        Friction torque, (n,), N m, of the velocity's sign; zero at rest.
+        out: friction torque, (n,), N m, of the velocity's sign; zero at rest.
     """
-    out = np.empty(qd.shape[0])
     for i in range(qd.shape[0]):
         phi1, phi2, phi3 = parameters[i, 0], parameters[i, 1], parameters[i, 2]
         out[i] = phi1 / (1.0 + math.exp(-phi2 * (qd[i] + phi3))) - phi1 / (1.0 + math.exp(-phi2 * phi3))

@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.robot.stack import stack_matrix
 
 
 @compiled
 def spd_inverse(A, out):
-    """Invert a symmetric positive-definite matrix by Cholesky.
+    """Invert a symmetric positive-definite matrix by Cholesky, A = L Lᵀ.
 
     Args:
         A: (n, n).
@@ -19,41 +20,54 @@ def spd_inverse(A, out):
         False where A is not positive definite.
     """
     n = A.shape[0]
-    L = np.zeros((n, n))
-    for j in range(n):
-        d = A[j, j]
-        for k in range(j):
-            d -= L[j, k] * L[j, k]
-        if not d > 0.0:
-            return False
-        L[j, j] = np.sqrt(d)
-        for i in range(j + 1, n):
-            s = A[i, j]
-            for k in range(j):
-                s -= L[i, k] * L[j, k]
-            L[i, j] = s / L[j, j]
-    Li = np.zeros((n, n))
-    for j in range(n):
-        Li[j, j] = 1.0 / L[j, j]
+    L = stack_matrix(n, n)
+    if not _cholesky(A, L):
+        return False
+    for j in range(n):  # L⁻¹ takes L's place column by column
+        L[j, j] = 1.0 / L[j, j]
         for i in range(j + 1, n):
             s = 0.0
             for k in range(j, i):
-                s -= L[i, k] * Li[k, j]
-            Li[i, j] = s / L[i, i]
+                s -= L[i, k] * L[k, j]
+            L[i, j] = s / L[i, i]
     for i in range(n):
         for j in range(i + 1):
             s = 0.0
             for k in range(i, n):
-                s += Li[k, i] * Li[k, j]
+                s += L[k, i] * L[k, j]
             out[i, j] = s
             out[j, i] = s
     return True
 
 
 @compiled
+def _cholesky(A, L):
+    """Fill the lower half of L with Cholesky's factor of A, both (n, n); False where there is none."""
+    for j in range(A.shape[0]):
+        d = A[j, j]
+        for k in range(j):
+            d -= L[j, k] * L[j, k]
+        if not d > 0.0:
+            return False
+        L[j, j] = math.sqrt(d)
+        for i in range(j + 1, A.shape[0]):
+            s = A[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            L[i, j] = s / L[j, j]
+    return True
+
+
+@compiled
 def matmul(A, B):
     """Multiply two small matrices, (m, k) and (k, n)."""
-    out = np.zeros((A.shape[0], B.shape[1]))
+    return matmul_into(A, B, np.empty((A.shape[0], B.shape[1])))
+
+
+@compiled
+def matmul_into(A, B, out):
+    """Write A B to `out`, which is neither of them, and give it back."""
+    out[:] = 0.0
     for i in range(A.shape[0]):
         for k in range(A.shape[1]):
             a = A[i, k]
@@ -65,7 +79,12 @@ def matmul(A, B):
 @compiled
 def matvec(A, x):
     """Multiply a small matrix and a vector, (m, n) and (n,)."""
-    out = np.empty(A.shape[0])
+    return matvec_into(A, x, np.empty(A.shape[0]))
+
+
+@compiled
+def matvec_into(A, x, out):
+    """Write A x to `out`, which is not x, and give it back."""
     for i in range(A.shape[0]):
         s = 0.0
         for j in range(A.shape[1]):
@@ -77,7 +96,13 @@ def matvec(A, x):
 @compiled
 def matvec_t(A, x):
     """Multiply a transposed small matrix and a vector, Aᵀ x with (m, n) and (m,)."""
-    out = np.zeros(A.shape[1])
+    return matvec_t_into(A, x, np.empty(A.shape[1]))
+
+
+@compiled
+def matvec_t_into(A, x, out):
+    """Write Aᵀ x to `out`, which is not x, and give it back."""
+    out[:] = 0.0
     for i in range(A.shape[0]):
         a = x[i]
         for j in range(A.shape[1]):
@@ -97,17 +122,16 @@ def dot(x, y):
 @compiled
 def cross(x, y):
     """Give x × y, (3,)."""
-    out = np.empty(3)
-    cross_into(x, y, out)
-    return out
+    return cross_into(x, y, np.empty(3))
 
 
 @compiled
 def cross_into(x, y, out):
-    """Write x × y, (3,), to `out`, which is neither of them."""
+    """Write x × y, (3,), to `out`, which is neither of them, and give it back."""
     out[0] = x[1] * y[2] - x[2] * y[1]
     out[1] = x[2] * y[0] - x[0] * y[2]
     out[2] = x[0] * y[1] - x[1] * y[0]
+    return out
 
 
 @compiled

@@ -6,9 +6,10 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick
-from contactsafe.robot.friction import joint_friction
-from contactsafe.robot.linalg import cross, matvec, matvec_t
+from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.linalg import cross, cross_into, matvec, matvec_into, matvec_t
 from contactsafe.robot.native import mj_jac, mj_step, view1, view2
+from contactsafe.robot.stack import stack_vector
 from contactsafe.sim.whiteboard import erase_under_pad
 
 _ERASE_EVERY = 8  # ticks: at 0.4 m/s the pad moves 3 mm between, a twentieth of its width
@@ -82,20 +83,20 @@ def _sense_wrench(plant, controller, noise):
     those of the last tick's measured posture.
     """
     data = view1(plant.sensordata, plant.nsensordata)
-    ma, force, moment = np.empty(3), np.empty(3), np.empty(3)
+    ma, force, moment, lever_moment = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     for k in range(3):
         accelerometer = data[plant.adr_wrist_accelerometer + k] + plant.accelerometer_sigma * noise[6 + k]
         ma[k] = plant.tool_mass * accelerometer
         force[k] = ma[k] - data[plant.adr_wrist_force + k] + plant.wrench_bias[k] + plant.force_sigma * noise[k]
-    weight_moment = cross(plant.tool_com, ma)
+    cross_into(plant.tool_com, ma, lever_moment)
     for k in range(3):
         read = data[plant.adr_wrist_torque + k]
-        moment[k] = weight_moment[k] - read + plant.wrench_bias[3 + k] + plant.moment_sigma * noise[3 + k]
-    moment -= cross(plant.tcp, force)
+        moment[k] = lever_moment[k] - read + plant.wrench_bias[3 + k] + plant.moment_sigma * noise[3 + k]
+    moment -= cross_into(plant.tcp, force, lever_moment)
     R = controller.dynamics.rotation
     measurement = controller.measurement
-    measurement.wrench_ee[:3] = matvec(R, force)
-    measurement.wrench_ee[3:] = matvec(R, moment)
+    matvec_into(R, force, measurement.wrench_ee[:3])
+    matvec_into(R, moment, measurement.wrench_ee[3:])
     measurement.has_wrench = 1
 
 
@@ -105,8 +106,8 @@ def act(plant, controller, noise):
     tau = controller.output.torque
     n = tau.shape[0]
     ctrl, applied = view1(plant.ctrl, n), view1(plant.qfrc_applied, n)
-    friction = joint_friction(plant.friction, view1(plant.qvel, n))
-    push = push_torque(plant, n)
+    friction = joint_friction_into(plant.friction, view1(plant.qvel, n), stack_vector(n))
+    push = push_torque(plant, stack_vector(n))
     for i in range(n):
         command = plant.tau_delayed[i] if plant.delay_ticks > 0 else tau[i]
         plant.tau_delayed[i] = tau[i]
@@ -132,9 +133,9 @@ def _move_obstacles(plant):
 
 
 @compiled
-def push_torque(plant, n):
-    """Give the joint torque of the push in force at this tick, (n,), N m."""
-    tau = np.zeros(n)
+def push_torque(plant, tau):
+    """Fill the joint torque of the push in force at this tick, (n,), N m, and give it back."""
+    tau[:] = 0.0
     if plant.push_body == 0 or plant.tick < plant.push_start or plant.tick >= plant.push_stop:
         return tau
     body = plant.push_body
@@ -144,7 +145,7 @@ def push_torque(plant, n):
     unused = np.zeros((3, plant.nv))
     mj_jac(plant.model, plant.data, J.ctypes, unused.ctypes, point.ctypes, body)
     share = min(1.0, (plant.tick - plant.push_start + 1) / max(plant.push_ramp, 1))
-    for i in range(n):
+    for i in range(tau.shape[0]):
         for k in range(3):
             tau[i] += J[k, i] * plant.push_force[k] * share
     return tau
@@ -191,7 +192,7 @@ def obstacle_force(plant):
 
 @compiled
 def _measure(plant, cells, report):
-    force = np.empty(3)
+    force = stack_vector(3)
     pad_force(plant, force)
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
     report.tool_force_mean += size
@@ -233,7 +234,7 @@ def _record(plant, controller, row):
     for index in range(plant.n_obstacles):
         row.obstacle_position[index, :] = xpos[plant.obstacle_bodies[index]]
     row.tau_arm[:] = view1(plant.qfrc_constraint, n)
-    row.tau_arm[:] += push_torque(plant, n)
+    row.tau_arm[:] += push_torque(plant, stack_vector(n))
     row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, tool_position(plant)))
 
 
