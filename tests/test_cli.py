@@ -89,6 +89,30 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
     ("words", "text"),
     [
         (
+            "evaluate --seed abc",
+            "--seed: 'abc' is not a whole number; --seed INT of boards, starts and noise. (default: 0); "
+            "see contactsafe evaluate --help",
+        ),
+        ("bench --fast", "unknown: --fast; see contactsafe bench --help"),
+        (
+            "demo --trial 3",
+            "unknown: --trial, 3; perhaps you meant --trials INT seeds tried with each controller. (default: 10); "
+            "see contactsafe demo --help",
+        ),
+    ],
+)
+def test_words_that_make_no_sense_are_told_in_one_line_too(words, text, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words.split())
+    assert stop.value.code == 2
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", f"contactsafe: {text}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
             "experiment dancing",
             "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, "
             "detection, hostile",
@@ -156,6 +180,21 @@ def test_a_bundle_that_is_not_whole_is_told(bundle, capsys):
     (bundle / "policy.onnx").unlink()
     told = mistake(capsys, "evaluate", str(bundle))
     assert told == f"{bundle / 'policy.onnx'} is missing; the bundle is incomplete, copy or export it anew"
+
+
+@pytest.mark.parametrize("named", ["run", "run/bundle"])
+def test_a_run_without_a_bundle_is_told_how_to_leave_one(named, tmp_path, capsys):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "checkpoint.pt").write_bytes(b"")
+    told = mistake(capsys, "evaluate", str(tmp_path / named))
+    assert told == (
+        f"the run in {tmp_path / 'run'} was stopped before it left a bundle; go on with --resume, and with "
+        "--resume --max-minutes 0.1 it leaves what it has learned so far"
+    )
+
+
+def test_a_run_in_place_of_its_bundle_is_told(bundle, tmp_path, capsys):
+    assert mistake(capsys, "evaluate", str(tmp_path)) == f"{tmp_path} is a run; give its bundle, {bundle}"
 
 
 @pytest.mark.parametrize("command", ["demo", "experiment disturbance"])

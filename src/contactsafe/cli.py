@@ -1,6 +1,7 @@
 """The command line: the one place that composes everything."""
 
 import datetime
+import functools
 import importlib.util
 import inspect
 import sys
@@ -14,11 +15,13 @@ import tyro
 from tqdm import tqdm
 
 import contactsafe
+from contactsafe.compiled import CACHE_FOLDER
 from contactsafe.control import presets
 from contactsafe.errors import ContactSafeError, InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
-from contactsafe.learning.bundle import MANIFEST, Bundle, digest, shipped_bundle
+from contactsafe.learning.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
+from contactsafe.parse import call, parse
 
 Names = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
 
@@ -46,7 +49,6 @@ def demo(
     loaded = Bundle.load(bundle or shipped_bundle())
     folder = prepare_output(out)
     started = time.monotonic()
-    print("contactsafe demo: compiling on the first run takes about a minute", file=sys.stderr)
     results = _run(registry.PAPER, loaded, config)
     facts = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
     page = write_report(folder, results, facts)
@@ -125,6 +127,8 @@ def evaluate(
 ) -> None:
     """Let a policy wipe boards it has never seen and report success, forces and times.
 
+    For one seed and number of boards all policies and controllers meet the same ones.
+
     Args:
         bundle: folder of the policy; the shipped one if none is named.
         episodes: boards to wipe.
@@ -142,7 +146,7 @@ def evaluate(
     from contactsafe.envs.config import WipingConfig
     from contactsafe.envs.pushes import Pushes
     from contactsafe.learning import references
-    from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
+    from contactsafe.learning.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
     from contactsafe.learning.policy import Policy
     from contactsafe.sim.randomisation import Randomisation
 
@@ -168,18 +172,18 @@ def evaluate(
         policy = references.reference(str(reference), config, env, seed)
     else:
         policy = Policy(loaded, env.camera_homography)
-    with tqdm(total=episodes, desc="boards", file=sys.stderr) as bar:
+    with _bar("boards", episodes) as bar:
         results = evaluate_policy(policy, env, episodes, HELD_OUT_SEED + seed, on_episode=lambda record: bar.update())
     env.close()
     records = results.pop("records")
+    task = {"boards": boards, "sight": sight, "engine": engine, "pushed": pushed, "randomised": randomised}
+    asked = {"policy": reference or str(bundle or "shipped"), "seed": seed, "controller": controller, "task": task}
     if json:
-        task = {"boards": boards, "sight": sight, "engine": engine, "pushed": pushed, "randomised": randomised}
-        policy_name = reference or str(bundle or "shipped")
-        asked = {"policy": policy_name, "seed": seed, "controller": controller, "task": task}
         print(to_json({**results, **asked, "boards": records}))
         return
+    print(", ".join(f"{name} {value}" for name, value in {**asked, **task}.items() if name != "task"))
     for key, value in results.items():
-        print(f"{key:28s} {value:.4g}" if isinstance(value, float) else f"{key:28s} {value}")
+        print(f"{key:24s}{value:>10.4g}  {FIGURES[key]}")
 
 
 def bench(json: bool = False, bundle: Path | None = None) -> None:
@@ -192,7 +196,7 @@ def bench(json: bool = False, bundle: Path | None = None) -> None:
     from contactsafe.experiments.speed import ROUNDS, measure_speed
 
     loaded = Bundle.load(bundle or shipped_bundle())
-    with tqdm(total=ROUNDS, desc="rounds", file=sys.stderr) as bar:
+    with _bar("rounds", ROUNDS) as bar:
         speeds = measure_speed(loaded, bar.update)
     if json:
         print(to_json([asdict(speed) for speed in speeds]))
@@ -211,9 +215,10 @@ def train(arguments: Sequence[str]) -> None:
             "usage: contactsafe train vae|ppo|sac [options]\n\n"
             "  vae  the eyes: foveated ones, which need no training, or a β-VAE; writes runs/vae\n"
             "  ppo  a policy on what it feels and sees; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
-            "  sac  the same with SAC, which reuses what it has seen; writes runs/sac\n\n"
+            "  sac  the same with SAC; writes runs/sac. Its settings are not tuned: it has not cleared a board yet\n\n"
             "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
-            "from its last epoch or rollout, and ends with the weights that it would have had."
+            "from its last epoch or rollout, with the settings it was started with where none are given, and ends with\n"
+            "the weights that it would have had."
         )
         return
     name = arguments[0]
@@ -228,11 +233,19 @@ def train(arguments: Sequence[str]) -> None:
         _train_policy(name, list(arguments[1:]))
 
 
+def _settings(kind: type, program: str, words: list[str]) -> Any:
+    """Read the settings of a training; a run that goes on keeps its own where nothing else is said."""
+    from contactsafe.learning.checkpoints import as_started
+
+    config = parse(kind, program, words)
+    return parse(kind, program, words, default=as_started(config)) if config.resume else config
+
+
 def _train_vae(arguments: list[str]) -> None:
     from contactsafe.envs.sampling import MaskSampler
     from contactsafe.learning.train_vae import VaeConfig, train_vae
 
-    config = tyro.cli(VaeConfig, prog="contactsafe train vae", args=arguments)
+    config = _settings(VaeConfig, "contactsafe train vae", arguments)
     sampler = MaskSampler()
     report = train_vae(config, sampler.sample, sampler.homography)
     shown = ("representation", "active_latents", "reconstruction", "nearest_ink")
@@ -248,7 +261,7 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     from contactsafe.learning.train_policy import train_policy
     from contactsafe.sim.randomisation import Randomisation
 
-    config = tyro.cli(ALGORITHMS[algorithm], prog=f"contactsafe train {algorithm}", args=arguments)
+    config = _settings(ALGORITHMS[algorithm], f"contactsafe train {algorithm}", arguments)
     task = WipingConfig(randomisation=Randomisation.broad() if config.randomise else None)
 
     def make_env(n: int):
@@ -257,8 +270,12 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     def make_held_out(n: int):
         return gymnasium.make_vec(config.env_id, num_envs=n, config=WipingConfig())
 
-    print(to_json(train_policy(config, make_env, make_held_out)))
-    print(f"policy: {config.out / 'bundle'}; next: contactsafe evaluate {config.out / 'bundle'}")
+    if _first_run():
+        print("contactsafe: the first run compiles for a minute or two", file=sys.stderr)
+    results = train_policy(config, make_env, make_held_out)
+    if results:
+        print(to_json(results))
+    print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}")
 
 
 @dataclass(frozen=True)
@@ -280,14 +297,28 @@ def _split(names: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",") if name.strip())
 
 
+@functools.cache
+def _first_run() -> bool:
+    """Tell whether this version has compiled nothing yet; asked once, before it does."""
+    return not any(Path(CACHE_FOLDER).rglob("*.nbi"))
+
+
+def _described(what: str) -> str:
+    return f"{what} (the first run compiles for a minute or two)" if _first_run() else what
+
+
+def _bar(what: str, total: int) -> tqdm:
+    return tqdm(total=total, desc=_described(what), file=sys.stderr)
+
+
 def _run(names: Sequence[str], bundle: Bundle | None, config: ExperimentConfig) -> list[Experiment]:
     from contactsafe.experiments import registry
 
     entries = {name: registry.by_name(name) for name in names}
     results = []
-    with tqdm(total=sum(entry.count(config) for entry in entries.values()), unit="trial", file=sys.stderr) as bar:
+    with _bar(names[0], sum(entry.count(config) for entry in entries.values())) as bar:
         for name, entry in entries.items():
-            bar.set_description(name)
+            bar.set_description_str(_described(name))
             results.append(entry.run(bundle, config, bar.update))
     return results
 
@@ -325,6 +356,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: words after `contactsafe`; those of the process where None.
     """
+    _first_run()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help"):
         print(_help())
@@ -338,7 +370,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = COMMANDS[words[0]]
     try:
         if command.parses:
-            tyro.cli(command.run, prog=f"contactsafe {words[0]}", args=words[1:])
+            call(command.run, f"contactsafe {words[0]}", words[1:])
         else:
             command.run(words[1:])
     except ContactSafeError as error:

@@ -21,12 +21,15 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tests.learning.fakes import FakeWiping  # noqa: E402
 
 import contactsafe  # noqa: E402, F401 -- registers the task
+from contactsafe.cli import main  # noqa: E402
 from contactsafe.envs.config import WipingConfig  # noqa: E402
 from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.checkpoints import load_checkpoint, pack, unpack  # noqa: E402
+from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, unpack  # noqa: E402
+from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.recorder import Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
+from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "evaluate_episodes": 0, "total_steps": 512}
 PPO = PpoConfig(epochs=2, **SMALL)
@@ -203,6 +206,35 @@ def test_an_environment_that_keeps_nothing_starts_new_episodes(vae, tmp_path):
     assert "worlds" not in unpack(load_checkpoint(config.out)["env"])["below"]
     train_policy(dataclasses.replace(config, resume=True, total_steps=256), Forgetful)
     assert load_checkpoint(config.out)["counters"]["num_timesteps"] == 256
+
+
+def test_a_run_that_goes_on_keeps_its_settings_but_for_those_that_are_given(vae, tmp_path, monkeypatch):
+    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64, max_minutes=5.0, seed=3)
+    train_policy(config, FakeWiping)
+    told = []
+    monkeypatch.setattr("contactsafe.learning.train_policy.train_policy", lambda config, *_: told.append(config))
+    words = ["train", "ppo", "--out", str(config.out), "--resume"]
+    assert main(words) == 0
+    assert main([*words, "--total-steps", "128", "--max-minutes", "1"]) == 0
+    resumed = dataclasses.replace(config, resume=True, max_minutes=0.0)
+    assert told == [resumed, dataclasses.replace(resumed, total_steps=128, max_minutes=1.0)]
+
+
+def test_eyes_that_are_trained_on_keep_their_settings(vae):
+    again = as_started(VaeConfig(out=vae, resume=True))
+    assert again.encoder == EncoderConfig(size=32, channels=(4, 4, 8))
+    assert (again.out, again.resume, again.representation, again.images) == (vae, True, "tool", 64)
+
+
+def test_all_settings_that_differ_are_told(vae, tmp_path):
+    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
+    train_policy(config, FakeWiping)
+    with pytest.raises(InvalidInputError) as error:
+        train_policy(dataclasses.replace(config, seed=4, epochs=3, resume=True), FakeWiping)
+    assert str(error.value) == (
+        "the run was started with seed = 0, now it is 4; epochs = 2, now it is 3; "
+        "keep the setting, or start anew with another --out"
+    )
 
 
 def test_what_cannot_be_resumed(vae, tmp_path):

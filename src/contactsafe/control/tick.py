@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from contactsafe.compiled import compiled
 from contactsafe.control.estimate import (
     LOST_AFTER_TICKS,
@@ -30,8 +28,7 @@ from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.robot.linalg import dot, matmul, matvec_t, matvec_t_into, shorten
-from contactsafe.robot.stack import stack_vector
+from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST, _NO_TORQUE = 1, 2, 3, 4, 5, 6
 

@@ -51,7 +51,7 @@ class PpoConfig(PolicyConfig):
             env,
             learning_rate=self.falling_rate(),
             n_steps=self.rollout_steps,
-            batch_size=self.batch,
+            batch_size=min(self.batch, self.num_envs * self.rollout_steps),
             n_epochs=self.epochs,
             gamma=self.discount**self.action_repeat,
             gae_lambda=self.gae_lambda,

@@ -22,6 +22,9 @@ from contactsafe.learning.scan import Scan
 FORMAT = 3
 """Version of the folder's layout; raised when an older reader would misread it."""
 
+FOLDER = "bundle"
+"""Where a run leaves its bundle, within its own folder."""
+
 MANIFEST = "bundle.json"
 ENCODER, POLICY = "encoder.onnx", "policy.onnx"
 MAX_MANIFEST_BYTES = 1_000_000
@@ -100,8 +103,8 @@ class Bundle:
                 model has other inputs and outputs, keeps weights outside its file or needs operators beyond ONNX's own.
         """
         folder = Path(folder)
-        if not folder.is_dir():
-            raise BundleError(f"no bundle at {folder}: not a folder; give the path of a folder that holds {MANIFEST}")
+        if not (folder / MANIFEST).is_file():
+            raise BundleError(_what_is_there(folder))
         manifest = _read_manifest(folder)
         latent = ("float", [manifest["latent_size"]])
         encoder = None
@@ -129,6 +132,21 @@ class Bundle:
     def action_repeat(self):
         """Environment steps for which one action is given."""
         return int(self.manifest["action_repeat"])
+
+
+def _what_is_there(folder):
+    """Say what a folder that has no manifest is, and what to do."""
+    if (folder / FOLDER / MANIFEST).is_file():
+        return f"{folder} is a run; give its bundle, {folder / FOLDER}"
+    run = folder.parent if folder.name == FOLDER else folder
+    if (run / "checkpoint.pt").is_file():
+        return (
+            f"the run in {run} was stopped before it left a bundle; go on with --resume, and with "
+            "--resume --max-minutes 0.1 it leaves what it has learned so far"
+        )
+    if not folder.is_dir():
+        return f"no bundle at {folder}: not a folder; give the path of a folder that holds {MANIFEST}"
+    return f"{folder / MANIFEST} is missing; the bundle is incomplete, copy or export it anew"
 
 
 def _read_bounded(path, limit):

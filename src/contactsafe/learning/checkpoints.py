@@ -18,6 +18,9 @@ from contactsafe.errors import InvalidInputError, OutputError
 
 CHECKPOINT = "checkpoint.pt"
 
+_OF_A_SESSION = ("out", "resume", "max_minutes")
+"""Settings that a run which goes on does not take from the session before."""
+
 
 def write_atomically(path, write):
     """Let write(temporary path) make a file, then put it in place of path in one step.
@@ -144,12 +147,45 @@ def check_same_config(saved, config, may_differ):
     Raises:
         InvalidInputError: a field differs.
     """
-    for name, now in plain(config).items():
-        if name not in may_differ and saved.get(name) != now:
-            raise InvalidInputError(
-                f"the run was started with {name} = {saved.get(name)}, now it is {now}; "
-                "keep the setting, or start anew with another --out"
-            )
+    changed = [
+        f"{name} = {saved.get(name)}, now it is {now}"
+        for name, now in plain(config).items()
+        if name not in may_differ and saved.get(name) != now
+    ]
+    if changed:
+        raise InvalidInputError(
+            f"the run was started with {'; '.join(changed)}; keep the setting, or start anew with another --out"
+        )
+
+
+def as_started(config):
+    """Give the settings of the run in config.out, but for what belongs to a session; config itself where there is none.
+
+    Args:
+        config: settings of the kind that the run was started with, a dataclass.
+
+    Raises:
+        InvalidInputError: its checkpoint cannot be read.
+    """
+    if not (Path(config.out) / CHECKPOINT).is_file():
+        return config
+    state = load_checkpoint(config.out)
+    if state.get("algorithm", getattr(config, "algorithm", None)) != getattr(config, "algorithm", None):
+        return config
+    kept = {name: value for name, value in state.get("config", {}).items() if name not in _OF_A_SESSION}
+    return _replaced(config, kept)
+
+
+def _replaced(config, values):
+    """Replace fields of a dataclass by what `plain` made of them."""
+
+    def typed(now, value):
+        if dataclasses.is_dataclass(now):
+            return _replaced(now, value)
+        return type(now)(value) if isinstance(now, tuple | Path) else value
+
+    known = [field.name for field in dataclasses.fields(config) if field.name in values]
+    return dataclasses.replace(config, **{name: typed(getattr(config, name), values[name]) for name in known})
 
 
 def plain(config):

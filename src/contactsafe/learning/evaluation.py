@@ -8,6 +8,25 @@ CONTACT_N = 0.5
 """Tool force above which the pad counts as pressed, N (issue 2: what it takes to erase)."""
 
 
+FIGURES = {
+    "episodes": "boards wiped, one episode each",
+    "success": "share of boards wiped clean: 99.8 % of the ink gone, which ends the episode",
+    "cleared_99": "share of boards with 99 % of their ink gone within the time limit",
+    "ink_removed_mean": "share of a board's ink that was wiped off: mean",
+    "ink_removed_median": "the same: median",
+    "ink_removed_p10": "the same: 10th percentile",
+    "time_mean_s": "length of an episode, s: mean, 20 s where a board was not wiped clean",
+    "time_to_clean_median_s": "the same, of the boards wiped clean alone: median",
+    "peak_force_median_n": "largest force on the tool in an episode, N: median",
+    "peak_force_p95_n": "the same: 95th percentile",
+    "peak_force_max_n": "the same: largest of all",
+    "contact_force_median_n": "force on the tool, N, the largest of each policy step in contact: median",
+    "arm_table_contacts": "episodes ended because something other than the pad met board or table",
+    "contact_share": "share of all policy steps in which the tool was in contact; the rest goes from patch to patch",
+    "return_mean": "sum of an episode's rewards: mean",
+}
+"""What `evaluate_policy` gives, in its order, and what it means; forces are the simulator's."""
+
 HELD_OUT_SEED = 1_000_003
 """Added to the seeds of boards that are never trained on."""
 
@@ -49,12 +68,8 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
         on_episode: called with the record of each episode as it ends, for a progress bar.
 
     Returns:
-        episodes; success: share that ended with a clean board; cleared_99: share with 99 % of the ink or more gone;
-        ink_removed_mean, _median, _p10: share of the ink, 0..1;
-        time_mean_s: length of an episode; time_to_clean_median_s: of the successful, NaN if none; peak_force_median_n,
-        _p95_n, _max_n: largest tool force of an episode; contact_force_median_n: of all steps in contact, each
-        counted with its largest force; arm_table_contacts: episodes ended by any part but the pad on board or table;
-        contact_share: of all steps; return_mean; records: a dict per episode, by environment and then by time.
+        A dict of `FIGURES`, NaN where nothing was wiped clean, and records: a dict per episode, by environment and then
+        by time.
 
     Raises:
         InvalidInputError: episodes is below 1.

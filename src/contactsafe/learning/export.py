@@ -1,5 +1,6 @@
 """From trained networks to a bundle: exported, compared with torch, sealed, and put in place in one step."""
 
+import logging
 import os
 import shutil
 import tempfile
@@ -59,6 +60,7 @@ def to_onnx(module, examples, inputs, output):
         The file's bytes.
     """
     batch = torch.export.Dim("n", min=1, max=4096)
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it tells of packages that nothing here asks for
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         path = Path(folder) / "model.onnx"

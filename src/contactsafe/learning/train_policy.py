@@ -9,8 +9,8 @@ from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
 from contactsafe.errors import InvalidInputError
-from contactsafe.learning.bundle import digest
-from contactsafe.learning.checkpoints import plain, prepare_folder, write_json
+from contactsafe.learning.bundle import FOLDER, digest
+from contactsafe.learning.checkpoints import CHECKPOINT, plain, prepare_folder, write_json
 from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.observation import ObservationScaling
@@ -52,7 +52,7 @@ def train_policy(config, make_env=None, make_held_out=None):
     finally:
         env.close()
     layers, description = config.actor(model), _describe(config, eyes, effort)
-    folder = export_bundle(out / "bundle", eyes.encoder, layers, env.scaling, description, force=True)
+    folder = export_bundle(out / FOLDER, eyes.encoder, layers, env.scaling, description, force=True)
     if config.evaluate_episodes:
         description["results"] = _evaluate(folder, make_held_out or make_env, config)
         export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
@@ -75,9 +75,11 @@ class _Eyes:
             encoder = (folder / "encoder.onnx").read_bytes() if vae["representation"] in LEARNED else None
             version = vae["format"]
         except (OSError, ValueError, KeyError, TypeError) as error:
+            remedy = f"run `contactsafe train vae --out {folder}` first"
+            if (folder / CHECKPOINT).exists():
+                remedy = "it is a run; give the folder in which `contactsafe train vae` has come to its end"
             raise InvalidInputError(
-                f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); "
-                f"run `contactsafe train vae --out {folder}` first"
+                f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); {remedy}"
             ) from error
         if version != EYES_FORMAT:
             raise InvalidInputError(

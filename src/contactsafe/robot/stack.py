@@ -12,7 +12,8 @@ from numba.np.arrayobj import populate_array
 def _array_on_stack(context, builder, array, shape):
     """Make an uninitialised row-major array of float64 in the frame of the function being compiled."""
     itemsize = context.get_constant(types.intp, 8)
-    strides, size = [], itemsize
+    strides: list = []
+    size = itemsize
     for length in reversed(shape):
         strides.insert(0, size)
         size = builder.mul(size, length)
