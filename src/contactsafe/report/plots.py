@@ -75,7 +75,8 @@ class Plotter:
         experiment: Experiment,
         scenario: str,
         panels: Sequence[Panel],
-        band: tuple[float, float] | None = None,
+        bands: Sequence[tuple[float, float]] = (),
+        only: str | None = None,
     ) -> str:
         """Draw panels under each other, one curve a controller, named at its end.
 
@@ -83,12 +84,13 @@ class Plotter:
             experiment: whose recordings are drawn.
             scenario: which of them.
             panels: what to draw, from top to bottom.
-            band: span of time to be shaded, s.
+            bands: spans of time to be shaded, s.
+            only: the controller to draw; all where None.
 
         Returns:
             An SVG element; empty where nothing was recorded.
         """
-        recordings = data.recorded(experiment, scenario)
+        recordings = [run for run in data.recorded(experiment, scenario) if only in (None, run.controller)]
         if not recordings:
             return ""
         height = 0.5 + (1.6 if len(panels) == 1 else _PANEL_IN) * len(panels)
@@ -96,19 +98,19 @@ class Plotter:
             figure = Figure(figsize=(3.5, height), layout=_LAYOUT)
             axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
             for axis, panel in zip(axes, panels, strict=True):
-                self._panel(axis, recordings, panel, band)
+                self._panel(axis, recordings, panel, bands)
             self._name_curves(axes[0], recordings, panels[0].curve)
             axes[-1].set_xlabel("time (s)")
             buffer = io.StringIO()
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
         return self._inline(buffer.getvalue(), f"{scenario}: {', '.join(panel.label for panel in panels)} over time")
 
-    def _panel(self, axis, recordings: Sequence[Recording], panel: Panel, band: tuple[float, float] | None) -> None:
+    def _panel(self, axis, recordings: Sequence[Recording], panel: Panel, bands: Sequence[tuple[float, float]]) -> None:
         axis.set_title(panel.label)
         axis.grid(axis="y")
         axis.set_axisbelow(True)
         axis.locator_params(axis="y", nbins=4)
-        if band is not None:
+        for band in bands:
             axis.axvspan(*band, color=_BAND, linewidth=0)
         for recording in recordings:
             times, values, colour = data.seconds(recording), panel.curve(recording), self._tokens[recording.controller]
@@ -195,6 +197,21 @@ def scatter(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
         np.add.reduceat(values, starts) / counts,
         np.maximum.reduceat(values, starts),
     )
+
+
+def spans(times: np.ndarray, active: np.ndarray, gap_s: float = 0.02) -> list[tuple[float, float]]:
+    """Give the spans of time in which something is so, those less than a gap apart as one.
+
+    Args:
+        times: (T,), s.
+        active: whether it is so, (T,).
+        gap_s: s.
+    """
+    found: list[tuple[float, float]] = []
+    for time in times[active]:
+        begun = found.pop()[0] if found and time - found[-1][1] <= gap_s else time
+        found.append((float(begun), float(time)))
+    return found
 
 
 def apart(places: np.ndarray, gap: float) -> list[float]:

@@ -10,7 +10,7 @@ import contactsafe
 from contactsafe.report import data, rows, strip, tables
 from contactsafe.report.data import Experiment, Recording, RunFacts
 from contactsafe.report.film import film_json
-from contactsafe.report.plots import Curve, Panel, Plotter
+from contactsafe.report.plots import Curve, Panel, Plotter, spans
 from contactsafe.report.scene import Subject
 from contactsafe.report.summary import versions
 from contactsafe.robot.panda import PANDA, WIPING_PAD
@@ -27,6 +27,7 @@ ABOUT = {
 }
 """The known controllers in a few words."""
 
+_CONTACT_N = 0.5  # force on the tool that counts as contact
 _OF_POLICY = ("task-safety", "joint-safety")
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
@@ -114,19 +115,16 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
             Panel(f"tool force, {axis} (N)", _component("tool_force", i), noisy=True) for i, axis in enumerate("xyz")
         ]
         single.append(Panel("ink left (%)", lambda run: 100 * run.trace["ink_left"]))
-        single.append(Panel("stiffness K1, z (1/s²)", _component("K_task", 2)))
-        single.append(Panel("damping D1, z (1/s)", _component("D_task", 2)))
         drawn = [plotter.plot(experiment, name, [panel]) for name in names for panel in single]
-        said = (
-            "Force of the board on the tool along the world's axes, mean and, pale, range; ink left; stiffness and "
-            "damping across the board, as the policy chose them."
+        said = "Force of the board on the tool along the world's axes, mean and, pale, range; ink left."
+        return _figure(drawn, experiment, said, "plots two") + "".join(
+            _impedance(experiment, name, plotter) for name in names
         )
-        return _figure(drawn, experiment, said, "plots two")
     if experiment.name == "disturbance":
         panels = [Panel(f"tool error, {axis} (mm)", _component("error", i, 1000.0)) for i, axis in enumerate("xyz")]
-        band = facts.get("push_s")
-        drawn = [_titled(name, plotter.plot(experiment, name, panels, band)) for name in names]
-        said = "Departure of the tool from where it is without the push." + (" Shaded: the push." if band else "")
+        bands = [facts["push_s"]] if facts.get("push_s") else []
+        drawn = [_titled(name, plotter.plot(experiment, name, panels, bands)) for name in names]
+        said = "Departure of the tool from where it is without the push." + (" Shaded: the push." if bands else "")
         return _figure(drawn, experiment, said, "plots")
     if experiment.name == "collisions":
         panels = [
@@ -138,6 +136,25 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
         said = "Force of the obstacle on the arm, of two the larger; what the controller takes it for; the tool."
         return _figure(drawn, experiment, said, "plots two")
     return ""
+
+
+def _impedance(experiment: Experiment, scenario: str, plotter: Plotter) -> str:
+    """How stiff and how damped the policy makes the arm over one board, under the last controller, against contact."""
+    runs = data.recorded(experiment, scenario)
+    if not runs:
+        return ""
+    force = _length(runs[-1].trace["tool_force"], 1.0)
+    panels = [
+        Panel("force on the tool (N)", lambda run: _length(run.trace["tool_force"], 1.0)),
+        Panel("stiffness K1 towards the board, z (1/s²)", _component("K_task", 2)),
+        Panel("damping D1 towards the board, z (1/s)", _component("D_task", 2)),
+        Panel("stiffness K1 along the board, x (1/s²)", _component("K_task", 0)),
+        Panel("damping D1 along the board, x (1/s)", _component("D_task", 0)),
+    ]
+    contact = spans(data.seconds(runs[-1]), force > _CONTACT_N)
+    drawn = [plotter.plot(experiment, scenario, panels, contact, runs[-1].controller)]
+    said = f"What the policy does with its impedance, under {runs[-1].controller}. Shaded: contact, above {_CONTACT_N} N."
+    return _figure(drawn, experiment, said, "plots")
 
 
 def _figure(drawn: Sequence[str], experiment: Experiment, said: str, kind: str) -> str:
