@@ -45,20 +45,24 @@ def row(run: Path, c: dict[str, list[float]]) -> str:
 
 
 def draw(curves: dict[str, dict[str, list[float]]], out: Path) -> None:
-    """Draw share of boards cleared and ink left over the minutes trained."""
-    figure = Figure(figsize=(7.5, 3.4), layout="constrained")
-    left, right = figure.subplots(1, 2, sharex=True)
+    """Draw the share of boards cleared over minutes and over steps, and the ink left over steps."""
+    figure = Figure(figsize=(10.5, 3.4), layout="constrained")
+    by_minutes, by_steps, ink = figure.subplots(1, 3)
     for name, c in curves.items():
-        left.plot(c["minutes"], [100 * share for share in c["cleared"]], label=name)
-        right.plot(c["minutes"], [100 * share for share in c["left"]], label=name)
-    left.axhline(100 * SHARE, color="0.6", linewidth=0.8, linestyle="--")
-    left.set(title="boards cleared, %", xlabel="minutes trained", ylim=(0, 100), xlim=(0, None))
-    right.set(title="ink left, % (logarithmic)", xlabel="minutes trained", yscale="log")
-    left.legend(loc="lower right", frameon=False)
-    for axes in (left, right):
+        millions = [steps / 1e6 for steps in c["steps"]]
+        cleared = [100 * share for share in c["cleared"]]
+        by_minutes.plot(c["minutes"], cleared, label=name)
+        by_steps.plot(millions, cleared)
+        ink.plot(millions, [100 * share for share in c["left"]])
+    for axes, unit in ((by_minutes, "minutes trained"), (by_steps, "million steps")):
+        axes.axhline(100 * SHARE, color="0.6", linewidth=0.8, linestyle="--")
+        axes.set(title="boards cleared, %", xlabel=unit, ylim=(0, 102), xlim=(0, None))
+    ink.set(title="ink left, % (logarithmic)", xlabel="million steps", yscale="log", xlim=(0, None))
+    by_minutes.legend(loc="lower right", frameon=False)
+    for axes in (by_minutes, by_steps, ink):
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(out, dpi=110)
+    figure.savefig(out, dpi=100)
 
 
 def main() -> None:

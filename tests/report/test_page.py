@@ -128,6 +128,14 @@ def test_page_says_where_all_aims_are_reached(page):
     assert re.search(r">safe</strong> reaches 6 of 6 aims\.", section)
 
 
+def test_stiffness_and_damping_are_drawn_against_contact_for_one_controller(page):
+    figure = page[: page.index("What the policy does with its impedance, under safe")].rpartition("<figure>")[2]
+    for label in ("stiffness K1 towards the board", "damping D1 towards", "stiffness K1 along the board", "damping D1"):
+        assert label in figure
+    assert "var(--band)" in figure
+    assert "--c-vices" not in figure
+
+
 def test_film_holds_the_recordings(page, experiments):
     text = re.search(r'id="film-joint-safety">(.*?)</script>', page, re.DOTALL).group(1)
     film = json.loads(text)
