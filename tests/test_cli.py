@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import io
 import json
 import shutil
 import subprocess
@@ -12,6 +13,8 @@ import pytest
 import contactsafe
 from contactsafe.cli import COMMANDS, main
 from contactsafe.learning.bundle import shipped_bundle
+from contactsafe.learning.evaluation import FIGURES
+from contactsafe.parse import parse
 
 
 def mistake(capsys, *words):
@@ -109,6 +112,24 @@ def test_words_that_make_no_sense_are_told_in_one_line_too(words, text, capsys):
     assert (out, err) == ("", f"contactsafe: {text}\n")
 
 
+@pytest.mark.parametrize("kind", ["ascii", "utf-8", "terminal"])
+def test_a_mistake_is_told_alike_in_pipes_and_terminals(kind, capsys, monkeypatch):
+    def asked(trials: int = 0):
+        pass
+
+    class Stdout(io.StringIO):
+        encoding = "ascii" if kind == "ascii" else "utf-8"
+
+        def isatty(self):
+            return kind == "terminal"
+
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setattr(sys, "stdout", Stdout())
+    with pytest.raises(SystemExit):
+        parse(asked, "program", ["--sed", "3"])
+    assert capsys.readouterr().err == "contactsafe: unknown: --sed, 3; see program --help\n"
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -188,8 +209,15 @@ def test_a_run_without_a_bundle_is_told_how_to_leave_one(named, tmp_path, capsys
     (tmp_path / "run" / "checkpoint.pt").write_bytes(b"")
     told = mistake(capsys, "evaluate", str(tmp_path / named))
     assert told == (
-        f"the run in {tmp_path / 'run'} was stopped before it left a bundle; go on with --resume, and with "
-        "--resume --max-minutes 0.1 it leaves what it has learned so far"
+        f"the run in {tmp_path / 'run'} has left no bundle yet; once it is stopped, the command that began it, with "
+        "--resume --max-minutes 0.1, has it leave what it has learned"
+    )
+
+
+def test_eyes_in_place_of_a_policy_are_told(tmp_path, capsys):
+    (tmp_path / "vae.json").write_text("{}")
+    assert mistake(capsys, "evaluate", str(tmp_path)) == (
+        f"{tmp_path} holds eyes, not a policy; run `contactsafe train ppo --vae {tmp_path}`, which leaves a bundle"
     )
 
 
@@ -276,6 +304,14 @@ def test_evaluate_says_how_the_policy_did(bundle, capsys):
     results = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert results["seed"] == 3
     assert len(results["boards"]) == 2
+
+
+def test_evaluate_explains_every_figure_it_prints(bundle, capsys):
+    assert main(["evaluate", str(bundle), "--episodes", "1", "--seed", "3"]) == 0
+    asked, *rows = capsys.readouterr().out.splitlines()
+    assert asked.startswith(f"policy {bundle}, seed 3, controller safe, boards strokes")
+    assert [row.split()[0] for row in rows] == list(FIGURES)
+    assert all(FIGURES[row.split()[0]] in row for row in rows)
 
 
 @pytest.mark.slow

@@ -183,7 +183,7 @@ def evaluate(
         return
     print(", ".join(f"{name} {value}" for name, value in {**asked, **task}.items() if name != "task"))
     for key, value in results.items():
-        print(f"{key:24s}{value:>10.4g}  {FIGURES[key]}")
+        print(f"{key:24s}{value:>10{'d' if isinstance(value, int) else '.4g'}}  {FIGURES[key]}")
 
 
 def bench(json: bool = False, bundle: Path | None = None) -> None:
@@ -217,8 +217,8 @@ def train(arguments: Sequence[str]) -> None:
             "  ppo  a policy on what it feels and sees; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
             "  sac  the same with SAC; writes runs/sac. Its settings are not tuned: it has not cleared a board yet\n\n"
             "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
-            "from its last epoch or rollout, with the settings it was started with where none are given, and ends with\n"
-            "the weights that it would have had."
+            "from its last epoch or rollout, with the settings of its last session where none are given, and ends\n"
+            "with the weights that it would have had."
         )
         return
     name = arguments[0]
@@ -234,7 +234,7 @@ def train(arguments: Sequence[str]) -> None:
 
 
 def _settings(kind: type, program: str, words: list[str]) -> Any:
-    """Read the settings of a training; a run that goes on keeps its own where nothing else is said."""
+    """Read the settings of a training; where it goes on, those of its last session stay unless words say otherwise."""
     from contactsafe.learning.checkpoints import as_started
 
     config = parse(kind, program, words)

@@ -11,12 +11,12 @@ from typing import Any
 import tyro
 
 _PLAINER = {
-    r"Error parsing (--[\w-]+): ": r"\1: ",
+    r"Error parsing (--[\w.-]+): ": r"\1: ",
     r"Error parsing \w+: ": "",
     r"invalid literal for int\(\) with base 10: ('.*?')": r"\1 is not a whole number",
     r"Could not find valid parse for arguments: (\[.*?\])": r"\1 makes no sense",
     r"could not convert string to float: ('.*?')": r"\1 is not a number",
-    r" Argument helptext: (--[\w-]+)": r"; \1",
+    r" Argument helptext: (--[\w.-]+)": r"; \1",
     r"Missing from [\w ]+: ": "missing: ",
     r"Unrecognized options: ": "unknown: ",
     r" Perhaps you meant: ": "; perhaps you meant ",
@@ -39,11 +39,13 @@ def parse(what: Callable, program: str, words: Sequence[str], **options: Any) ->
     told = io.StringIO()
     try:
         with contextlib.redirect_stderr(told):
-            return tyro.cli(what, prog=program, args=list(words), **options)
+            asked = tyro.cli(what, prog=program, args=list(words), **options)
     except SystemExit as stop:
         if stop.code:
             print(f"contactsafe: {_one_line(told.getvalue())}; see {program} --help", file=sys.stderr)
         raise
+    print(told.getvalue(), end="", file=sys.stderr)
+    return asked
 
 
 def call(function: Callable, program: str, words: Sequence[str]) -> None:
@@ -58,7 +60,8 @@ def call(function: Callable, program: str, words: Sequence[str]) -> None:
 
 def _one_line(box: str) -> str:
     """Take title and frame off a message of tyro's, and what it says of help."""
-    inner = [line.strip("│ ") for line in box.splitlines()[1:]]
+    plain = re.sub(r"\x1b\[[\d;]*m", "", box)  # in a terminal it has colours
+    inner = [line.strip("│ ") for line in plain.splitlines()[1:]]
     text = re.sub(r"\s+", " ", " ".join(line for line in inner if line.strip("╰╯─-")))
     text = text.partition("For full helptext")[0].strip()
     for found, said in _PLAINER.items():

@@ -27,7 +27,7 @@ from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, unpack  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
-from contactsafe.learning.recorder import Recorder  # noqa: E402
+from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
 
@@ -197,6 +197,16 @@ def test_curves_have_no_point_twice_and_none_missing(vae, tmp_path):
         assert [point.step for point in curves.Scalars(tag)] == list(range(first, 513, 64)), tag
 
 
+def test_a_session_begun_within_the_same_second_is_logged_after_the_other(tmp_path):
+    for steps in (0, 64):
+        curves = Curves(tmp_path, steps)
+        curves.write({"a": float(steps)}, {}, steps + 64)
+        curves.close()
+    seconds = [int(path.name.split(".")[3]) for path in sorted(tmp_path.iterdir())]
+    assert seconds[0] < seconds[1]
+    assert [point.step for point in EventAccumulator(str(tmp_path)).Reload().Scalars("a")] == [64, 128]
+
+
 def test_an_environment_that_keeps_nothing_starts_new_episodes(vae, tmp_path):
     class Forgetful(FakeWiping):
         snapshot = property()
@@ -233,6 +243,18 @@ def test_all_settings_that_differ_are_told(vae, tmp_path):
         train_policy(dataclasses.replace(config, seed=4, epochs=3, resume=True), FakeWiping)
     assert str(error.value) == (
         "the run was started with seed = 0, now it is 4; epochs = 2, now it is 3; "
+        "keep the setting, or start anew with another --out"
+    )
+
+
+def test_another_task_is_another_run(vae, tmp_path):
+    """Under another reward it would not end with the weights it would have had."""
+    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
+    train_policy(config, real_boards)
+    with pytest.raises(InvalidInputError) as error:
+        train_policy(dataclasses.replace(config, resume=True, total_steps=128), partial(real_boards, seconds=0.4))
+    assert str(error.value) == (
+        "the run was started with task.episode_s = 0.3, now it is 0.4; "
         "keep the setting, or start anew with another --out"
     )
 

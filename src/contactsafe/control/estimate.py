@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.control.laws import momentum, observer_step, passes_elsewhere, weigh
+from contactsafe.control.laws import momentum_into, observer_step, passes_elsewhere, weigh
 from contactsafe.control.records import FREE
 from contactsafe.robot.dynamics import mass_regressor
 from contactsafe.robot.friction import joint_friction_into
@@ -42,7 +42,7 @@ def start(c):
         state.mass_covariance[j, j] = params.mass_variance[j]
     for i in range(state.gravity_sigma.shape[0]):
         state.gravity_sigma[i] = _gravity_sigma(c, i)
-    momentum(dynamics.M, c.measurement.qd, state.momentum)
+    momentum_into(dynamics.M, c.measurement.qd, state.momentum)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
@@ -79,7 +79,7 @@ def observe(c):
     n = state.tau.shape[0]
     since = params.dt * (1 + state.bad_ticks)
     known = state.bad_ticks <= LOST_AFTER_TICKS
-    p = momentum(dynamics.M, c.measurement.qd, stack_vector(n))
+    p = momentum_into(dynamics.M, c.measurement.qd, stack_vector(n))
     tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
     for i in range(n):
         ramp[i] = state.tau[i] - state.tau_before[i]

@@ -199,7 +199,7 @@ def is_pushed(drop, moved, lever, stiffness):
 
 
 @compiled
-def momentum(M, qd, out):
+def momentum_into(M, qd, out):
     """Fill p = M q̇, (10), (n,), kg m²/s, and give it back."""
     return matvec_into(M, qd, out)
 

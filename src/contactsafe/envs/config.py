@@ -61,7 +61,7 @@ class RewardConfig:
         time: per step.
         force: per step at twice `gentle_n`, rising from zero at `gentle_n`, at most four times the weight.
         force_limit_n: the paper's 40 N.
-        gentle_n: upper end of the band of 2 to 10 N that wiping should keep to, N.
+        gentle_n: N.
         arm_table: once, when any part but the pad meets board or table; the episode ends.
     """
 
@@ -70,9 +70,9 @@ class RewardConfig:
     approach: float = 5.0
     contact: float = 0.005
     time: float = -0.01
-    force: float = -0.2
+    force: float = -0.04
     force_limit_n: float = 40.0
-    gentle_n: float = 10.0
+    gentle_n: float = 7.0
     arm_table: float = -5.0
 
     def __post_init__(self):

@@ -139,10 +139,12 @@ def _what_is_there(folder):
     if (folder / FOLDER / MANIFEST).is_file():
         return f"{folder} is a run; give its bundle, {folder / FOLDER}"
     run = folder.parent if folder.name == FOLDER else folder
+    if (run / "vae.json").is_file():
+        return f"{run} holds eyes, not a policy; run `contactsafe train ppo --vae {run}`, which leaves a bundle"
     if (run / "checkpoint.pt").is_file():
         return (
-            f"the run in {run} was stopped before it left a bundle; go on with --resume, and with "
-            "--resume --max-minutes 0.1 it leaves what it has learned so far"
+            f"the run in {run} has left no bundle yet; once it is stopped, the command that began it, with --resume "
+            "--max-minutes 0.1, has it leave what it has learned"
         )
     if not folder.is_dir():
         return f"no bundle at {folder}: not a folder; give the path of a folder that holds {MANIFEST}"

@@ -18,8 +18,8 @@ from contactsafe.errors import InvalidInputError, OutputError
 
 CHECKPOINT = "checkpoint.pt"
 
-_OF_A_SESSION = ("out", "resume", "max_minutes")
-"""Settings that a run which goes on does not take from the session before."""
+NOT_TAKEN_OVER = ("out", "resume", "max_minutes")
+"""Settings that a run which goes on does not take over from the session before."""
 
 
 def write_atomically(path, write):
@@ -147,19 +147,36 @@ def check_same_config(saved, config, may_differ):
     Raises:
         InvalidInputError: a field differs.
     """
-    changed = [
-        f"{name} = {saved.get(name)}, now it is {now}"
-        for name, now in plain(config).items()
-        if name not in may_differ and saved.get(name) != now
-    ]
+    check_unchanged(saved, {name: value for name, value in plain(config).items() if name not in may_differ})
+
+
+def check_unchanged(saved, now):
+    """Refuse to go on where any of nested plain settings is not what was saved.
+
+    Raises:
+        InvalidInputError: naming all that differ.
+    """
+    changed = list(_changes(saved, now))
     if changed:
         raise InvalidInputError(
             f"the run was started with {'; '.join(changed)}; keep the setting, or start anew with another --out"
         )
 
 
+def _changes(saved, now, within=""):
+    """Name what differs of nested settings, one phrase each."""
+    for name, value in now.items():
+        before = saved.get(name)
+        if isinstance(value, dict) and isinstance(before, dict):
+            yield from _changes(before, value, f"{within}{name}.")
+        elif before != value:
+            yield f"{within}{name} = {before}, now it is {value}"
+
+
 def as_started(config):
-    """Give the settings of the run in config.out, but for what belongs to a session; config itself where there is none.
+    """Give the settings of the last session of the run in config.out, but for NOT_TAKEN_OVER.
+
+    Where there is no such run they are those given.
 
     Args:
         config: settings of the kind that the run was started with, a dataclass.
@@ -172,7 +189,7 @@ def as_started(config):
     state = load_checkpoint(config.out)
     if state.get("algorithm", getattr(config, "algorithm", None)) != getattr(config, "algorithm", None):
         return config
-    kept = {name: value for name, value in state.get("config", {}).items() if name not in _OF_A_SESSION}
+    kept = {name: value for name, value in state.get("config", {}).items() if name not in NOT_TAKEN_OVER}
     return _replaced(config, kept)
 
 

@@ -10,12 +10,12 @@ CONTACT_N = 0.5
 
 FIGURES = {
     "episodes": "boards wiped, one episode each",
-    "success": "share of boards wiped clean: 99.8 % of the ink gone, which ends the episode",
+    "success": "share of boards wiped clean (99.8 % of the ink gone, unless told otherwise), which ends the episode",
     "cleared_99": "share of boards with 99 % of their ink gone within the time limit",
     "ink_removed_mean": "share of a board's ink that was wiped off: mean",
     "ink_removed_median": "the same: median",
     "ink_removed_p10": "the same: 10th percentile",
-    "time_mean_s": "length of an episode, s: mean, 20 s where a board was not wiped clean",
+    "time_mean_s": "length of an episode, s: mean; 20 s where nothing ended it before, such as a clean board",
     "time_to_clean_median_s": "the same, of the boards wiped clean alone: median",
     "peak_force_median_n": "largest force on the tool in an episode, N: median",
     "peak_force_p95_n": "the same: 95th percentile",

@@ -1,5 +1,6 @@
 """From trained networks to a bundle: exported, compared with torch, sealed, and put in place in one step."""
 
+import contextlib
 import logging
 import os
 import shutil
@@ -47,6 +48,18 @@ class DeployedPolicy(nn.Module):
         return self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
 
 
+@contextlib.contextmanager
+def _quiet(name):
+    """Keep a logger's warnings back: the exporter tells of packages that nothing here asks for."""
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
 def to_onnx(module, examples, inputs, output):
     """Export a module with a free batch size, all weights inside, and no trace of the machine it was made on.
 
@@ -60,8 +73,7 @@ def to_onnx(module, examples, inputs, output):
         The file's bytes.
     """
     batch = torch.export.Dim("n", min=1, max=4096)
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it tells of packages that nothing here asks for
-    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+    with warnings.catch_warnings(), _quiet("torch.onnx"), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         path = Path(folder) / "model.onnx"
         torch.onnx.export(

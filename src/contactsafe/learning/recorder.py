@@ -1,6 +1,7 @@
 """What happens beside the learning: curves, progress, checkpoints, and the time allowed."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
@@ -18,6 +19,7 @@ class Curves(KVWriter):
     """
 
     def __init__(self, folder, steps):
+        _let_the_second_pass(folder)
         self._writer = SummaryWriter(str(folder), purge_step=steps + 1)
 
     def write(self, key_values, key_excluded, step=0):
@@ -30,6 +32,14 @@ class Curves(KVWriter):
     def close(self):
         """Close the file."""
         self._writer.close()
+
+
+def _let_the_second_pass(folder):
+    """Wait until a new log comes after those that are there: TensorBoard goes by the second in their names."""
+    begun = [int(path.name.split(".")[3]) for path in Path(folder).glob("events.out.tfevents.*")]
+    left = max(begun, default=0) + 1 - time.time()
+    if 0.0 < left <= 1.0:
+        time.sleep(left)
 
 
 class Recorder(BaseCallback):

@@ -5,6 +5,7 @@ from collections import deque
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.checkpoints import (
     check_same_config,
+    check_unchanged,
     load_checkpoint,
     pack,
     plain,
@@ -17,7 +18,7 @@ from contactsafe.learning.policy_config import SESSION_FIELDS
 from contactsafe.learning.replay import ReplayFile
 from contactsafe.sim.snapshot import generator_state
 
-FORMAT = 2
+FORMAT = 3
 """Version of the checkpoint's layout."""
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
@@ -69,6 +70,8 @@ class Run:
         self.config, self.model, self.env = config, model, env
         self.encoder_digest = encoder_digest
         self.saved_steps = -1
+        tasks = getattr(env.env.unwrapped, "tasks", None)
+        self.task = {} if tasks is None else {"task": plain(tasks.config)}
         buffer = getattr(model, "replay_buffer", None)
         slack = config.rollout_steps + model.train_freq.frequency if buffer is not None else 0
         self.replay = None if buffer is None else ReplayFile(config.out / "replay.bin", buffer, slack)
@@ -86,6 +89,7 @@ class Run:
             "algorithm": self.config.algorithm,
             "config": plain(self.config),
             "encoder": self.encoder_digest,
+            "task": self.task,
             "minutes": minutes,
             "parameters": model.get_parameters(),
             "variables": {name: getattr(model, name).detach() for name in variables},
@@ -107,7 +111,12 @@ class Run:
         self.saved_steps = model.num_timesteps
 
     def restore(self, state):
-        """Put model and environment back to where a checkpoint left them; give the minutes it had trained."""
+        """Put model and environment back to where a checkpoint left them; give the minutes it had trained.
+
+        Raises:
+            InvalidInputError: the run was started on another task, such as one with another reward.
+        """
+        check_unchanged(state["task"], self.task)
         model = self.model
         model.set_parameters(state["parameters"], exact_match=True)
         for name, value in state["variables"].items():

@@ -200,17 +200,18 @@ def scatter(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def spans(times: np.ndarray, active: np.ndarray, gap_s: float = 0.02) -> list[tuple[float, float]]:
-    """Give the spans of time in which something is so, those less than a gap apart as one.
+    """Give the spans of time in which something is so, each to the sample after its last; near ones are one.
 
     Args:
         times: (T,), s.
         active: whether it is so, (T,).
-        gap_s: s.
+        gap_s: largest gap between two spans that are drawn as one, s.
     """
     found: list[tuple[float, float]] = []
-    for time in times[active]:
-        begun = found.pop()[0] if found and time - found[-1][1] <= gap_s else time
-        found.append((float(begun), float(time)))
+    ends = np.append(times[1:], times[-1:])
+    for start, stop in zip(times[active], ends[active], strict=True):
+        begun = found.pop()[0] if found and start - found[-1][1] <= gap_s else start
+        found.append((float(begun), float(stop)))
     return found
 
 

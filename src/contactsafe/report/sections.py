@@ -143,18 +143,20 @@ def _impedance(experiment: Experiment, scenario: str, plotter: Plotter) -> str:
     runs = data.recorded(experiment, scenario)
     if not runs:
         return ""
-    force = _length(runs[-1].trace["tool_force"], 1.0)
+    force = Panel("force on the tool (N)", lambda run: _length(run.trace["tool_force"], 1.0))
     panels = [
-        Panel("force on the tool (N)", lambda run: _length(run.trace["tool_force"], 1.0)),
+        force,
         Panel("stiffness K1 towards the board, z (1/s²)", _component("K_task", 2)),
         Panel("damping D1 towards the board, z (1/s)", _component("D_task", 2)),
         Panel("stiffness K1 along the board, x (1/s²)", _component("K_task", 0)),
         Panel("damping D1 along the board, x (1/s)", _component("D_task", 0)),
     ]
-    contact = spans(data.seconds(runs[-1]), force > _CONTACT_N)
-    drawn = [plotter.plot(experiment, scenario, panels, contact, runs[-1].controller)]
-    said = f"What the policy does with its impedance, under {runs[-1].controller}. Shaded: contact, above {_CONTACT_N} N."
-    return _figure(drawn, experiment, said, "plots")
+    run = runs[-1]
+    contact = spans(data.seconds(run), force.curve(run) > _CONTACT_N)
+    drawn = plotter.plot(experiment, scenario, panels, contact, run.controller)
+    said = f"What the policy does with its impedance, under {run.controller}, seed {run.seed}. "
+    said += f"Shaded: contact, above {_CONTACT_N} N."
+    return f'<figure><div class="plots">{drawn}</div><figcaption>{said}</figcaption></figure>'
 
 
 def _figure(drawn: Sequence[str], experiment: Experiment, said: str, kind: str) -> str:

@@ -11,13 +11,11 @@ from numba.np.arrayobj import populate_array
 
 def _array_on_stack(context, builder, array, shape):
     """Make an uninitialised row-major array of float64 in the frame of the function being compiled."""
-    itemsize = context.get_constant(types.intp, 8)
+    itemsize, count = context.get_constant(types.intp, 8), context.get_constant(types.intp, 1)
     strides: list = []
-    size = itemsize
     for length in reversed(shape):
-        strides.insert(0, size)
-        size = builder.mul(size, length)
-    count = builder.sdiv(size, itemsize)
+        strides.insert(0, builder.mul(itemsize, count))
+        count = builder.mul(count, length)
     data = builder.alloca(context.get_data_type(types.float64), size=count)
     made = context.make_array(array)(context, builder)
     populate_array(made, data=data, shape=shape, strides=strides, itemsize=itemsize, meminfo=None)

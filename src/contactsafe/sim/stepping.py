@@ -107,7 +107,7 @@ def act(plant, controller, noise):
     n = tau.shape[0]
     ctrl, applied = view1(plant.ctrl, n), view1(plant.qfrc_applied, n)
     friction = joint_friction_into(plant.friction, view1(plant.qvel, n), stack_vector(n))
-    push = push_torque(plant, stack_vector(n))
+    push = push_torque_into(plant, stack_vector(n))
     for i in range(n):
         command = plant.tau_delayed[i] if plant.delay_ticks > 0 else tau[i]
         plant.tau_delayed[i] = tau[i]
@@ -133,7 +133,7 @@ def _move_obstacles(plant):
 
 
 @compiled
-def push_torque(plant, tau):
+def push_torque_into(plant, tau):
     """Fill the joint torque of the push in force at this tick, (n,), N m, and give it back."""
     tau[:] = 0.0
     if plant.push_body == 0 or plant.tick < plant.push_start or plant.tick >= plant.push_stop:
@@ -234,7 +234,7 @@ def _record(plant, controller, row):
     for index in range(plant.n_obstacles):
         row.obstacle_position[index, :] = xpos[plant.obstacle_bodies[index]]
     row.tau_arm[:] = view1(plant.qfrc_constraint, n)
-    row.tau_arm[:] += push_torque(plant, stack_vector(n))
+    row.tau_arm[:] += push_torque_into(plant, stack_vector(n))
     row.tau_arm[:] -= matvec_t(controller.dynamics.J, _pad_wrench(plant, tool_position(plant)))
 
 
