@@ -32,7 +32,7 @@ def table(summary: dict) -> str:
         for controller in ("vices", "paper", "safe"):
             spread = by_controller[controller][metric]
             low, middle, high = (scale * spread[key] for key in ("p5", "median", "p95"))
-            cells.append(f"{middle:.3g} [{low:.3g}, {high:.3g}]")
+            cells.append(f"{middle:.3g} [{round(low, 4):.3g}, {high:.3g}]")
         lines.append(f"| {label} | {unit} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
