@@ -24,7 +24,15 @@ from contactsafe.learning.policy_config import PolicyConfig  # noqa: E402
 from contactsafe.learning.replay import ReplayFile  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 
-SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "total_steps": 256, "evaluate_episodes": 4}
+SMALL = {
+    "num_envs": 4,
+    "rollout_steps": 16,
+    "batch": 32,
+    "net": (16, 16),
+    "total_steps": 256,
+    "evaluate_episodes": 4,
+    "action_repeat": 1,
+}
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,7 @@ def test_sac_learns_to_go_where_the_ink_is(vae, tmp_path):
     config = SacConfig(
         vae=vae, out=tmp_path / "run", num_envs=16, total_steps=6144, rollout_steps=32, batch=128, net=(64, 64),
         learning_rate=2e-3, learning_starts=1000, buffer=20_000, discount=0.95,
-        evaluate_episodes=16, scan=0.0, observes=("pose",),
+        evaluate_episodes=16, scan=0.0, observes=("pose",), action_repeat=1, entropy_start=0.1,
     )  # fmt: skip
     results = train_policy(config, lambda n: SightedWiping(n, max_steps=40))
     assert results["ink_removed_mean"] > 0.8

@@ -33,7 +33,7 @@ from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "evaluate_episodes": 0, "total_steps": 512}
 PPO = PpoConfig(epochs=2, **SMALL)
-SAC = SacConfig(buffer=256, learning_starts=96, update_every=4, gradient_steps=2, **SMALL)
+SAC = SacConfig(buffer=256, learning_starts=96, update_every=4, gradient_steps=2, action_repeat=1, **SMALL)
 """Its memory is full after half the steps."""
 
 short_boards = partial(FakeWiping, max_steps=23)

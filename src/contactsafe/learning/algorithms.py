@@ -90,22 +90,25 @@ class SacConfig(PolicyConfig):
         update_every: steps of each environment between updates.
         gradient_steps: gradient steps of an update.
         target_share: of the way that the target networks go towards the critics in a gradient step.
-        entropy_start: first weight of the entropy; it is then tuned to an entropy of minus the number of actions.
+        entropy_start: first weight of the entropy; it is then tuned to an entropy of minus the number of actions. It
+            falls slowly: what is far above a step's reward, of some hundredths, is all that counts for long.
     """
 
     algorithm: ClassVar[str] = "sac"
 
     out: Path = Path("runs/sac")
     num_envs: int = 32
+    total_steps: int = 200_000
     rollout_steps: int = 128
     batch: int = 256
-    net: tuple[int, ...] = (256, 256)
+    net: tuple[int, ...] = (128, 128)
+    action_repeat: int = 4
     buffer: int = 300_000
     learning_starts: int = 10_000
     update_every: int = 1
     gradient_steps: int = 4
     target_share: float = 0.005
-    entropy_start: float = 0.1
+    entropy_start: float = 0.005
 
     def __post_init__(self):
         """Refuse a memory that is gone before it is saved."""
