@@ -215,7 +215,7 @@ def train(arguments: Sequence[str]) -> None:
             "usage: contactsafe train vae|ppo|sac [options]\n\n"
             "  vae  the eyes: foveated ones, which need no training, or a β-VAE; writes runs/vae\n"
             "  ppo  a policy on what it feels and sees; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
-            "  sac  the same with SAC; writes runs/sac. Its settings are not tuned: it has not cleared a board yet\n\n"
+            "  sac  the same with SAC, which learns soon but does not get as far; writes runs/sac\n\n"
             "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
             "from its last epoch or rollout, with the settings of its last session where none are given, and ends\n"
             "with the weights that it would have had."

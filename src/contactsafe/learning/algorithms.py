@@ -98,7 +98,7 @@ class SacConfig(PolicyConfig):
 
     out: Path = Path("runs/sac")
     num_envs: int = 32
-    total_steps: int = 200_000
+    total_steps: int = 80_000
     rollout_steps: int = 128
     batch: int = 256
     net: tuple[int, ...] = (128, 128)
