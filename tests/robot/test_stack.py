@@ -82,7 +82,7 @@ for function in (update, tick):
 
 
 def test_how_often_a_tick_asks_the_heap(tmp_path):
-    """Never for the dynamics; in free motion no more often than when this was written. A heap may keep a tick waiting."""
+    """Never for the dynamics; in free motion no more often than when this was written: a heap may keep it waiting."""
     environment = {**os.environ, "NUMBA_NRT_STATS": "1"}
     script = tmp_path / "count.py"  # a file: what is typed in cannot be cached
     script.write_text(_COUNT)
