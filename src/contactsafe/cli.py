@@ -23,6 +23,8 @@ from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.learning.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
 from contactsafe.parse import call, parse
 
+_COMPILES = "the first run compiles for a minute or two"
+
 Names = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
 
 
@@ -264,14 +266,10 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     config = _settings(ALGORITHMS[algorithm], f"contactsafe train {algorithm}", arguments)
     task = WipingConfig(randomisation=Randomisation.broad() if config.randomise else None)
 
-    def make_env(n: int):
-        return gymnasium.make_vec(config.env_id, num_envs=n, config=task)
-
-    def make_held_out(n: int):
-        return gymnasium.make_vec(config.env_id, num_envs=n, config=WipingConfig())
-
+    make_env = functools.partial(gymnasium.make_vec, config.env_id, config=task)
+    make_held_out = functools.partial(gymnasium.make_vec, config.env_id, config=WipingConfig())
     if _first_run():
-        print("contactsafe: the first run compiles for a minute or two", file=sys.stderr)
+        print(f"contactsafe: {_COMPILES}", file=sys.stderr)
     results = train_policy(config, make_env, make_held_out)
     if results:
         print(to_json(results))
@@ -304,7 +302,7 @@ def _first_run() -> bool:
 
 
 def _described(what: str) -> str:
-    return f"{what} (the first run compiles for a minute or two)" if _first_run() else what
+    return f"{what} ({_COMPILES})" if _first_run() else what
 
 
 def _bar(what: str, total: int) -> tqdm:

@@ -236,27 +236,21 @@ def test_eyes_that_are_trained_on_keep_their_settings(vae):
     assert (again.out, again.resume, again.representation, again.images) == (vae, True, "tool", 64)
 
 
-def test_all_settings_that_differ_are_told(vae, tmp_path):
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
-    train_policy(config, FakeWiping)
-    with pytest.raises(InvalidInputError) as error:
-        train_policy(dataclasses.replace(config, seed=4, epochs=3, resume=True), FakeWiping)
-    assert str(error.value) == (
-        "the run was started with seed = 0, now it is 4; epochs = 2, now it is 3; "
-        "keep the setting, or start anew with another --out"
-    )
-
-
-def test_another_task_is_another_run(vae, tmp_path):
-    """Under another reward it would not end with the weights it would have had."""
+@pytest.mark.parametrize(
+    ("changed", "seconds", "told"),
+    [
+        ({"seed": 4, "epochs": 3}, 0.3, "seed = 0, now it is 4; epochs = 2, now it is 3"),
+        ({}, 0.4, "task.episode_s = 0.3, now it is 0.4"),
+    ],
+    ids=["settings", "task"],
+)
+def test_what_would_end_with_other_weights_is_refused_and_all_of_it_told(changed, seconds, told, vae, tmp_path):
     config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
     train_policy(config, real_boards)
     with pytest.raises(InvalidInputError) as error:
-        train_policy(dataclasses.replace(config, resume=True, total_steps=128), partial(real_boards, seconds=0.4))
-    assert str(error.value) == (
-        "the run was started with task.episode_s = 0.3, now it is 0.4; "
-        "keep the setting, or start anew with another --out"
-    )
+        train_policy(dataclasses.replace(config, resume=True, **changed), partial(real_boards, seconds=seconds))
+    remedy = "keep the setting, or start anew with another --out"
+    assert str(error.value) == f"the run was started with {told}; {remedy}"
 
 
 def test_what_cannot_be_resumed(vae, tmp_path):

@@ -187,7 +187,7 @@ def as_started(config):
     if not (Path(config.out) / CHECKPOINT).is_file():
         return config
     state = load_checkpoint(config.out)
-    if state.get("algorithm", getattr(config, "algorithm", None)) != getattr(config, "algorithm", None):
+    if state.get("algorithm") != getattr(config, "algorithm", None):
         return config
     kept = {name: value for name, value in state.get("config", {}).items() if name not in NOT_TAKEN_OVER}
     return _replaced(config, kept)

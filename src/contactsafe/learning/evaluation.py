@@ -5,7 +5,7 @@ import numpy as np
 from contactsafe.errors import InvalidInputError
 
 CONTACT_N = 0.5
-"""Tool force above which the pad counts as pressed, N (issue 2: what it takes to erase)."""
+"""Tool force above which the pad counts as pressed, N: what it takes to erase."""
 
 
 FIGURES = {

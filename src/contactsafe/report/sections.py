@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 import contactsafe
+from contactsafe.learning.evaluation import CONTACT_N
 from contactsafe.report import data, rows, strip, tables
 from contactsafe.report.data import Experiment, Recording, RunFacts
 from contactsafe.report.film import film_json
@@ -27,7 +28,6 @@ ABOUT = {
 }
 """The known controllers in a few words."""
 
-_CONTACT_N = 0.5  # force on the tool that counts as contact
 _OF_POLICY = ("task-safety", "joint-safety")
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
@@ -152,10 +152,10 @@ def _impedance(experiment: Experiment, scenario: str, plotter: Plotter) -> str:
         Panel("damping D1 along the board, x (1/s)", _component("D_task", 0)),
     ]
     run = runs[-1]
-    contact = spans(data.seconds(run), force.curve(run) > _CONTACT_N)
+    contact = spans(data.seconds(run), force.curve(run) > CONTACT_N)
     drawn = plotter.plot(experiment, scenario, panels, contact, run.controller)
     said = f"What the policy does with its impedance, under {run.controller}, seed {run.seed}. "
-    said += f"Shaded: contact, above {_CONTACT_N} N."
+    said += f"Shaded: contact, above {CONTACT_N} N."
     return f'<figure><div class="plots">{drawn}</div><figcaption>{said}</figcaption></figure>'
 
 
