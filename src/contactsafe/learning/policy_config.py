@@ -3,10 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
+
+import tyro
 
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.observation import SCALES
+from contactsafe.parse import some_of
 
 SESSION_FIELDS = (
     "vae",
@@ -60,7 +63,7 @@ class PolicyConfig:
     vae: Path = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
-    env_id: str = "contactsafe/Wiping-v0"
+    env_id: Annotated[str, tyro.conf.arg(metavar="ID")] = "contactsafe/Wiping-v0"
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
@@ -73,7 +76,7 @@ class PolicyConfig:
     action_repeat: int = 1
     scan: float = 0.3
     reward_scale: float = 1.0
-    observes: tuple[str, ...] = ("pose", "target", "force")
+    observes: Annotated[tuple[str, ...], some_of(SCALES, " ")] = ("pose", "target", "force")
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
