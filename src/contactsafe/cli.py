@@ -84,12 +84,12 @@ def experiment(
 ) -> None:
     """Run one of the experiments.
 
-      task-safety   the policy wipes boards it has never seen: how hard does it press?
+      task-safety   the policy wipes boards never seen: how hard does it press?
       joint-safety  the forearm runs into an obstacle while the policy works.
       disturbance   somebody leans on the arm with 25 N.
-      collisions    random motions meet random obstacles with any point of the arm.
-      detection     how soon is a contact reported, on which link, how often falsely?
-      hostile       a policy asks for the impossible: does the arm keep its limits?
+      collisions    random motions meet random obstacles anywhere on the arm.
+      detection     how soon is a contact reported, where, how often falsely?
+      hostile       a policy asks for the impossible: are all limits kept?
 
     The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
     of any batch once more and draws it.
@@ -138,7 +138,7 @@ def evaluate(
 ) -> None:
     """Let a policy wipe boards it has never seen.
 
-    Reports success, forces and times. For one seed and number of boards all policies and controllers meet the same ones.
+    Reports success, forces and times. For one seed and number of boards all policies and controllers meet the same.
 
     Args:
         bundle: folder of the policy.
