@@ -39,14 +39,13 @@ def test_the_installed_program_says_its_version():
     assert ended("--version") == (0, f"contactsafe {contactsafe.__version__}\n".encode(), b"")
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "latin-1:strict", "gbk", "ascii"])
+@pytest.mark.parametrize("encoding", ["cp1252", "latin-1:strict", "ascii"])
 def test_an_encoding_without_a_character_shows_another_and_no_traceback(encoding):
     environment = {"PYTHONIOENCODING": encoding}
-    for words in (["--help"], ["evaluate", "--help"], ["train", "--help"]):
+    for words, shown in ((["evaluate", "--help"], b"{mujoco,pybullet}"), (["train", "--help"], b"a ?-VAE")):
         status, out, err = ended(*words, environment=environment)
         assert (status, err) == (0, b"")
-        assert b"usage: contactsafe" in out
-    assert ("a ?-VAE" in out.decode(encoding.partition(":")[0])) == (encoding != "gbk")
+        assert shown in out
 
 
 def test_a_progress_bar_and_files_in_an_encoding_without_their_characters(tmp_path):
@@ -59,15 +58,25 @@ def test_a_progress_bar_and_files_in_an_encoding_without_their_characters(tmp_pa
     assert "✓" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("flag", ["-O", "-OO"])
-def test_help_teaches_without_docstrings(flag):
-    for words in (["--help"], ["evaluate", "--help"], ["experiment", "--help"]):
-        assert ended(*words, flags=[flag]) == ended(*words)
+@pytest.mark.parametrize(
+    ("words", "taught"),
+    [
+        (["--help"], ["Let a policy wipe boards it has never seen."]),
+        (["experiment", "--help"], ["somebody leans on the arm", "seeds tried with each controller."]),
+    ],
+)
+def test_help_teaches_without_docstrings(words, taught):
+    status, out, err = ended(*words, flags=["-OO"])
+    assert (status, err) == (0, b"")
+    assert all(text in out.decode() for text in taught)
 
 
 def test_help_of_training_teaches_without_docstrings():
     pytest.importorskip("torch")
-    assert ended("train", "ppo", "--help", flags=["-OO"])[:2] == ended("train", "ppo", "--help")[:2]
+    status, out, _ = ended("train", "ppo", "--help", flags=["-OO"])
+    assert status == 0
+    for text in ("Settings of PPO", "passes over a rollout.", "environments side by side."):  # its own and its base's
+        assert text in out.decode()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX shells and signals")
@@ -105,7 +114,6 @@ class TestStreams:
         [
             ("$it --help >&-", 0),
             ("$it --help <&- >&- 2>&-", 0),
-            ("$it evaluate --episodes 1 >&- 2>&-", 0),
             ("$it dance >&- 2>&-", 2),
         ],
     )
@@ -117,7 +125,7 @@ class TestStreams:
 class TestSignals:
     """Signals at any moment."""
 
-    @pytest.mark.parametrize("after_s", [0.4, 0.8, 1.3, 2.0, 3.0])
+    @pytest.mark.parametrize("after_s", [0.4, 1.0, 2.0, 3.0])
     def test_control_c_stops_with_130_and_one_line_whenever_it_comes(self, after_s):
         self.stop(signal.SIGINT, after_s, b"contactsafe: stopped")
 

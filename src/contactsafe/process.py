@@ -74,6 +74,10 @@ class _LostError(BaseException):
         self.reason = reason
 
 
+class _Stopped(KeyboardInterrupt):
+    """Ctrl-C. Of a class of its own, for where Python's has passed through `exec`, Python kills itself at its end."""
+
+
 class _Outlet(io.FileIO):
     """What a stream writes to. Once it has failed, it takes everything and passes nothing on."""
 
@@ -131,7 +135,7 @@ def _interrupt(number: int, frame: object) -> None:
     """Let the command tidy up."""
     _received.append(number)
     _hear(_leave)
-    raise KeyboardInterrupt
+    raise _Stopped
 
 
 def _leave(number: int, frame: object) -> None:
