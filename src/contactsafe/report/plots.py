@@ -164,7 +164,8 @@ class Plotter:
             svg = svg.replace(token, style)
         for name, token in self._tokens.items():
             svg = svg.replace(token, f"var({data.css_variable(name)})")
-        return re.sub(r"font: (bold |700 )?([\d.]+)px [^;\"]*", r"font: \1\2px var(--sans)", svg).strip()
+        svg = re.sub(r"font: (bold |700 )?([\d.]+)px [^;\"]*", r"font: \1\2px var(--sans)", svg)  # matplotlib to 3.10
+        return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", svg).strip()
 
 
 def thin(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
