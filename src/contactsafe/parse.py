@@ -149,13 +149,13 @@ def _description(text: str) -> str:
     return textwrap.indent("\n".join(filled), " ")
 
 
-def _parts(what: Callable) -> Iterator[type]:
+def _parts(what: Any) -> Iterator[Any]:
     """Give the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
     for kind in getattr(what, "__mro__", ()):
         if dataclasses.is_dataclass(kind):
             yield kind
             for field in dataclasses.fields(kind):
-                yield from _parts(field.type)  # type: ignore[arg-type]
+                yield from _parts(field.type)
 
 
 def _one_line(box: str) -> str:
