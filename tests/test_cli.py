@@ -67,6 +67,10 @@ def test_training_has_help_of_its_own(kind, capsys):
     assert main(["train", kind, "--help"]) == 0
     out = capsys.readouterr().out
     assert "--resume" in out
+    chosen = (
+        ["{foveated,tool,paper}"] if kind == "vae" else [f"{{{','.join(ENGINES.values())}}}", "{pose,target,force}"]
+    )
+    assert all(names in out for names in chosen)
     assert not re.search(r"\bSTR\b|None", out)
 
 
@@ -183,6 +187,15 @@ def test_words_that_make_no_sense_are_told_in_one_line_too(words, text, capsys):
     assert main(words.split()) == 2
     out, err = capsys.readouterr()
     assert (out, err) == ("", f"contactsafe: {text}\n")
+
+
+def test_a_task_that_gymnasium_does_not_know_is_told_in_one_line(capsys):
+    pytest.importorskip("torch")
+    assert main(["train", "ppo", "--env-id", "CartPole-v1"]) == 2
+    assert capsys.readouterr().err == (
+        "contactsafe: --env-id: 'CartPole-v1' is unknown; choose from contactsafe/Wiping-v0, "
+        "contactsafe/WipingBullet-v0; see contactsafe train ppo --help\n"
+    )
 
 
 @pytest.mark.parametrize("kind", ["ascii", "utf-8", "terminal"])

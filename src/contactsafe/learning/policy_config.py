@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-import tyro
-
+from contactsafe.envs import ENGINES
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.observation import SCALES
-from contactsafe.parse import some_of
+from contactsafe.parse import one_of, some_of
 
 SESSION_FIELDS = (
     "vae",
@@ -35,7 +34,7 @@ class PolicyConfig:
         vae: folder of the eyes, as `contactsafe train vae` leaves them (vae.json; encoder.onnx where it is learned).
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
-        env_id: Gymnasium id of the task.
+        env_id: Gymnasium id of the task; from Python, any that gives the same observations.
         randomise: train on worlds that differ from episode to episode; held-out boards are wiped in the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
@@ -63,7 +62,7 @@ class PolicyConfig:
     vae: Path = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
-    env_id: Annotated[str, tyro.conf.arg(metavar="ID")] = "contactsafe/Wiping-v0"
+    env_id: Annotated[str, one_of(ENGINES.values())] = "contactsafe/Wiping-v0"
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
