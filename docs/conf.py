@@ -20,16 +20,19 @@ author = "the contactsafe authors"
 release = version = contactsafe.__version__
 
 extensions = [
+    "equations",
+    "offline",
     "myst_parser",
     "sphinx.ext.apidoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
 ]
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
+html_static_path = ["static"]
+html_math_renderer = "drawn"
 html_title = f"contactsafe {release}"
 
 myst_enable_extensions = ["dollarmath", "deflist"]

@@ -19,7 +19,8 @@ def printed(number: str) -> str:
 
 def main() -> None:
     """Rewrite the page's figures."""
-    PAGE.write_text(BLOCK.sub(lambda block: block[1] + printed(block[2]) + block[4], PAGE.read_text()))
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(BLOCK.sub(lambda block: block[1] + printed(block[2]) + block[4], text), encoding="utf-8")
 
 
 if __name__ == "__main__":

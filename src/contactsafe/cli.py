@@ -3,39 +3,53 @@
 import datetime
 import functools
 import importlib.util
-import inspect
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import tyro
 from tqdm import tqdm
 
 import contactsafe
+from contactsafe import process
 from contactsafe.compiled import CACHE_FOLDER
 from contactsafe.control import presets
+from contactsafe.envs import ENGINES
+from contactsafe.envs.config import Sight, WipingConfig
 from contactsafe.errors import ContactSafeError, InvalidInputError
-from contactsafe.experiments.config import ExperimentConfig
+from contactsafe.experiments import registry
+from contactsafe.experiments.config import PLANTS, ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.learning.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
-from contactsafe.parse import call, parse
+from contactsafe.learning.references import REFERENCES
+from contactsafe.parse import call, docstring, one_of, parse, some_of
+from contactsafe.sim.drawings import Boards
 
 _COMPILES = "the first run compiles for a minute or two"
 
-Names = Annotated[str, tyro.conf.arg(metavar="NAME,NAME,…")]
+Controller = Annotated[str, one_of(presets.PRESETS)]
+Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS)]
+BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
+
+
+def _usual_trials() -> str:
+    by_number: dict[int, list[str]] = {}
+    for name, entry in registry.ENTRIES.items():
+        by_number.setdefault(entry.trials, []).append(name)
+    return "; ".join(f"{number} for {', '.join(names)}" for number, names in by_number.items())
 
 
 def demo(
     out: Path = Path("contactsafe-demo"),
     trials: int = 10,
     seed: int = 0,
-    controllers: Names = "vices,paper,safe",
-    bundle: Path | None = None,
+    controllers: Controllers = ExperimentConfig.controllers,
+    bundle: BundleFolder = None,
 ) -> None:
-    """Run the shipped policy through the paper's three experiments and write a page about it.
+    """Run the paper's three experiments and write a page about them.
 
     Args:
         out: folder for report.html, summary.json and the trials as CSV.
@@ -44,10 +58,9 @@ def demo(
         controllers: presets to compare.
         bundle: folder of another policy.
     """
-    from contactsafe.experiments import registry
     from contactsafe.report import prepare_output, terminal_table, write_report
 
-    config = ExperimentConfig(_split(controllers), trials, seed)
+    config = ExperimentConfig(controllers, trials, seed)
     loaded = Bundle.load(bundle or shipped_bundle())
     folder = prepare_output(out)
     started = time.monotonic()
@@ -59,50 +72,44 @@ def demo(
 
 
 def experiment(
-    name: Annotated[str, tyro.conf.Positional],
-    controllers: Names = "vices,paper,safe",
-    trials: int | None = None,
+    name: Annotated[str, one_of(registry.ENTRIES), tyro.conf.Positional],
+    controllers: Controllers = ExperimentConfig.controllers,
+    trials: Annotated[int | None, tyro.conf.arg(help_behavior_hint=f"(default: {_usual_trials()})")] = None,
     seed: int = 0,
-    plants: Names = "real,clean",
-    minutes: float = 60.0,
-    out: Path | None = None,
+    plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS,
+    minutes: float = ExperimentConfig.minutes,
+    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None,
     json: bool = False,
-    bundle: Path | None = None,
+    bundle: BundleFolder = None,
 ) -> None:
-    """Run one experiment: task-safety, joint-safety, disturbance, collisions, detection or hostile.
+    """Run one of the experiments.
 
-    task-safety   the policy wipes boards it has never seen: how hard does the tool press?
-
-    joint-safety  something unknown draws the policy aside, and the forearm runs into an obstacle.
-
-    disturbance   somebody leans on the arm with 25 N.
-
-    collisions    random motions meet random obstacles with a random point of the arm: a battery.
-
-    detection     how soon is a contact reported, is its link named rightly, how often is one reported that is none?
+      task-safety   the policy wipes boards never seen: how hard does it press?
+      joint-safety  the forearm runs into an obstacle while the policy works.
+      disturbance   somebody leans on the arm with 25 N.
+      collisions    random motions meet random obstacles anywhere on the arm.
+      detection     how soon is a contact reported, where, how often falsely?
+      hostile       a policy asks for the impossible: are all limits kept?
 
     The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
     of any batch once more and draws it.
 
     Args:
-        name: task-safety, joint-safety, disturbance, collisions, detection or hostile.
+        name: what to run.
         controllers: presets to compare.
-        trials: seeds tried with each controller; 10, and 100 for collisions and detection, where nothing is said.
+        trials: seeds tried with each controller.
         seed: first seed.
         plants: collisions with an arm and sensors that have errors (real), without any (clean), or both side by side.
         minutes: simulated time in which detection counts false alarms.
-        out: folder for report.html, summary.json and the trials as NAME.csv; none is written without it.
+        out: folder for report.html, summary.json and the trials as NAME.csv.
         json: print tables, spreads and trials as JSON instead of text.
         bundle: folder of another policy.
     """
-    from contactsafe.experiments import registry
     from contactsafe.report import prepare_output, terminal_table, write_report
     from contactsafe.report.summary import summarise
 
     entry = registry.by_name(name)
-    config = ExperimentConfig(
-        _split(controllers), entry.trials if trials is None else trials, seed, _split(plants), minutes
-    )
+    config = ExperimentConfig(controllers, entry.trials if trials is None else trials, seed, plants, minutes)
     loaded = Bundle.load(bundle or shipped_bundle()) if bundle or entry.needs_policy else None
     folder = prepare_output(out) if out else None
     started = time.monotonic()
@@ -115,44 +122,44 @@ def experiment(
 
 
 def evaluate(
-    bundle: Annotated[Path | None, tyro.conf.Positional] = None,
+    bundle: Annotated[BundleFolder, tyro.conf.Positional] = None,
     episodes: int = 50,
     seed: int = 0,
-    controller: str = "safe",
-    boards: str = "strokes",
-    sight: str = "mask",
-    engine: str = "mujoco",
+    controller: Controller = WipingConfig.controller,
+    boards: Boards = WipingConfig.boards,
+    sight: Sight = WipingConfig.sight,
+    engine: Annotated[str, one_of(ENGINES)] = "mujoco",
     pushed: bool = False,
     randomised: bool = False,
-    reference: str | None = None,
+    reference: Annotated[
+        str | None, one_of(REFERENCES), tyro.conf.arg(help_behavior_hint="(default: the policy)")
+    ] = None,
     json: bool = False,
 ) -> None:
-    """Let a policy wipe boards it has never seen and report success, forces and times.
+    """Let a policy wipe boards it has never seen.
 
-    For one seed and number of boards all policies and controllers meet the same ones.
+    Reports success, forces and times. For one seed and number of boards all policies and controllers meet the same.
 
     Args:
-        bundle: folder of the policy; the shipped one if none is named.
+        bundle: folder of the policy.
         episodes: boards to wipe.
         seed: of boards, starts and noise.
         controller: preset underneath.
-        boards: strokes, digits, text or handwriting.
+        boards: what is drawn on them; all but strokes need contactsafe[handwriting].
         sight: the ink as it is (mask), or as segmentation finds it in photographs (photograph).
-        engine: mujoco or pybullet.
+        engine: what computes the physics.
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
         randomised: every board another height, tilt, pad, camera and plant, as in training.
-        reference: a script in place of the policy: raster, nearest-ink or random.
+        reference: a script in place of the policy.
         json: print JSON instead of a table.
     """
     from contactsafe.envs import make_engine
-    from contactsafe.envs.config import WipingConfig
     from contactsafe.envs.pushes import Pushes
     from contactsafe.learning import references
     from contactsafe.learning.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
     from contactsafe.learning.policy import Policy
     from contactsafe.sim.randomisation import Randomisation
 
-    presets.by_name(controller)
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
     if seed < 0:
@@ -162,8 +169,8 @@ def evaluate(
     loaded = None if reference else Bundle.load(bundle or shipped_bundle())
     config = WipingConfig(
         controller=controller,
-        boards=cast(Any, boards),
-        sight=cast(Any, sight),
+        boards=boards,
+        sight=sight,
         pushes=Pushes() if pushed else None,
         randomisation=Randomisation.broad() if randomised else None,
     )
@@ -188,8 +195,8 @@ def evaluate(
         print(f"{key:24s}{value:>10{'d' if isinstance(value, int) else '.4g'}}  {FIGURES[key]}")
 
 
-def bench(json: bool = False, bundle: Path | None = None) -> None:
-    """Time the parts on this machine, each as a median and as a ratio to bare physics.
+def bench(json: bool = False, bundle: BundleFolder = None) -> None:
+    """Time the parts on this machine, as medians and ratios to bare physics.
 
     Args:
         json: print JSON instead of a table.
@@ -211,17 +218,23 @@ def bench(json: bool = False, bundle: Path | None = None) -> None:
 
 
 def train(arguments: Sequence[str]) -> None:
-    """Prepare the eyes (vae) or train a policy (ppo, sac); `contactsafe train ppo --help`."""
+    """Prepare the eyes (vae) or train a policy (ppo, sac)."""
     if not arguments or arguments[0] in ("-h", "--help"):
         print(
-            "usage: contactsafe train vae|ppo|sac [options]\n\n"
-            "  vae  the eyes: foveated ones, which need no training, or a β-VAE; writes runs/vae\n"
-            "  ppo  a policy on what it feels and sees; reads runs/vae, writes runs/ppo and runs/ppo/bundle\n"
-            "  sac  the same with SAC, which learns soon but does not get as far; writes runs/sac\n\n"
-            "All show a progress bar and log to TensorBoard. A run that was stopped or killed goes on with --resume\n"
-            "from its last epoch or rollout, with the settings of its last session where none are given, and ends\n"
-            "with the weights that it would have had."
+            "usage: contactsafe train {vae,ppo,sac} [options]\n\n"
+            "  vae  the eyes: foveated ones, which need no training, or a β-VAE;\n"
+            "       writes runs/vae\n"
+            "  ppo  a policy on what it feels and sees; reads runs/vae,\n"
+            "       writes runs/ppo and runs/ppo/bundle\n"
+            "  sac  the same with SAC, which learns soon but does not get as far;\n"
+            "       writes runs/sac\n\n"
+            "All show a progress bar and log to TensorBoard. A run that was stopped or\n"
+            "killed goes on with --resume from its last epoch or rollout, with the settings\n"
+            "of its last session where none are given, and ends with the weights that it\n"
+            "would have had. `contactsafe train ppo --help` lists the settings of PPO."
         )
+        if not arguments:
+            raise SystemExit(2)
         return
     name = arguments[0]
     if name not in ("vae", "ppo", "sac"):
@@ -258,7 +271,6 @@ def _train_vae(arguments: list[str]) -> None:
 def _train_policy(algorithm: str, arguments: list[str]) -> None:
     import gymnasium
 
-    from contactsafe.envs.config import WipingConfig
     from contactsafe.learning.algorithms import ALGORITHMS
     from contactsafe.learning.train_policy import train_policy
     from contactsafe.sim.randomisation import Randomisation
@@ -291,10 +303,6 @@ COMMANDS = {
 }
 
 
-def _split(names: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in names.split(",") if name.strip())
-
-
 @functools.cache
 def _first_run() -> bool:
     """Tell whether this version has compiled nothing yet; asked once, before it does."""
@@ -310,8 +318,6 @@ def _bar(what: str, total: int) -> tqdm:
 
 
 def _run(names: Sequence[str], bundle: Bundle | None, config: ExperimentConfig) -> list[Experiment]:
-    from contactsafe.experiments import registry
-
     entries = {name: registry.by_name(name) for name in names}
     results = []
     with _bar(names[0], sum(entry.count(config) for entry in entries.values())) as bar:
@@ -344,7 +350,7 @@ def _facts(command: str, config: ExperimentConfig, bundle: Bundle | None, second
 def _help() -> str:
     lines = ["usage: contactsafe COMMAND [options]", ""]
     for name, command in COMMANDS.items():
-        lines.append(f"  {name:12s}{(inspect.getdoc(command.run) or '').splitlines()[0]}")
+        lines.append(f"  {name:12s}{docstring(command.run).partition(chr(10))[0]}")
     return "\n".join([*lines, "", "`contactsafe COMMAND --help` says more; `contactsafe --version` gives the version."])
 
 
@@ -352,10 +358,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; exit status 0 only when it did its job.
 
     Args:
-        arguments: words after `contactsafe`; those of the process where None.
+        arguments: words after `contactsafe`. Where None, this process is the program: the words are its own, and so are
+            streams and signals, see `contactsafe.process.run`.
+
+    Returns:
+        The exit status: 0, 1 where the command said in one line what is wrong, 2 where the words make no sense.
     """
+    if arguments is None:
+        return process.run(lambda: _main(sys.argv[1:]))
+    return _main(arguments)
+
+
+def _main(words: Sequence[str]) -> int:
     _first_run()
-    words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help"):
         print(_help())
         return 0 if words else 2
@@ -374,7 +389,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ContactSafeError as error:
         print(f"contactsafe: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print("contactsafe: stopped", file=sys.stderr)
-        return 130
+    except SystemExit as stop:  # tyro's, which has said why
+        return stop.code if isinstance(stop.code, int) else 0
     return 0

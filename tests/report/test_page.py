@@ -103,7 +103,7 @@ def test_every_figure_is_the_spreads_median_or_mean_where_the_row_says_so(parsed
 
 
 def test_missing_figure_is_a_dash(page):
-    assert '<td data-figure="task-safety/wiping/paper/time_s">–</td>' in page
+    assert re.search(r'data-figure="task-safety/wiping/paper/time_s">–</td>', page)
 
 
 def test_headline_shows_the_medians(page, experiments):
@@ -134,6 +134,29 @@ def test_stiffness_and_damping_are_drawn_against_contact_for_one_controller(page
         assert label in figure
     assert "var(--band)" in figure
     assert "--c-vices" not in figure
+
+
+def test_stiffness_is_drawn_at_the_type_size_of_all_other_plots(page):
+    """A page's column is so many px wide; what is drawn wider for it is shown at the same scale, and so is its type."""
+    widths = {"plots": set(), "plots two": set()}
+    for kind, figure in re.findall(r'<figure><div class="(plots[^"]*)">(.*?)</figure>', page, re.DOTALL):
+        widths[kind] |= {float(box.split()[2]) for box in re.findall(r'viewBox="([^"]*)"', figure)}
+        assert set(re.findall(r"font(?:-size)?: (?:bold |700 )?([\d.]+)px", figure)) == {"9"}
+    assert [len(found) for found in widths.values()] == [1, 1]
+    narrow, wide = (found.pop() for found in widths.values())
+    gap = 26  # of the grid, in style.css
+    assert wide / narrow == pytest.approx(((1080 - gap) / 2) / ((1080 - 2 * gap) / 3), rel=0.02)
+
+
+def test_tables_are_not_cut_off_at_the_right(page, parsed):
+    """Nothing of a table scrolls away; where the page is too narrow for columns, each cell says what it is of."""
+    style = page[: page.index("</style>")]
+    assert not re.search(r"\.wide \{[^}]*overflow", style)
+    assert "td[data-of]::before" in style
+    tables = re.findall(r'<div class="wide">.*?</table>', page, re.DOTALL)
+    assert tables
+    for cell in re.findall(r"<td([^>]*)>[^<]", "".join(tables)):
+        assert "data-of" in cell or 'class="unit"' in cell or cell == ""
 
 
 def test_film_holds_the_recordings(page, experiments):

@@ -18,7 +18,7 @@ _Z = 2
 
 
 def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
-    """Run the experiment.
+    """Run the experiment; the board with the most ink is recorded.
 
     Args:
         bundle: loaded `Bundle`.
@@ -27,20 +27,26 @@ def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = No
     """
     trials: list[Trial] = []
     recordings: list[Recording] = []
+    fullest: Recording | None
     for name in config.controllers:
+        most, fullest = 0, None  # ink, recording
         for seeds in config.batches():
             tasks = WipingTasks(WipingConfig(controller=name), len(seeds), list(seeds))
             for i, seed in enumerate(seeds):
                 tasks.reset(i, held_out(seed))
+            ink = tasks.tasks["ink_start"].copy()
             policy = policy_for(bundle, tasks)
             run = run_policy(tasks, policy.act, tasks.step_limit, stop_when_clean=True)
             for i, seed in enumerate(seeds):
                 trials.append(Trial(SCENARIO, name, seed, wiping_metrics(run.traces[i], run.clean[i])))
-            if config.seed in seeds:
-                recordings.append(run.recording(0, SCENARIO, name, config.seed))
+            i = int(np.argmax(ink))
+            if ink[i] > most:  # all controllers get the same boards, so it is the same one of each
+                most, fullest = ink[i], run.recording(i, SCENARIO, name, seeds[i])
             tasks.worlds.close()
             if progress:
                 progress(len(seeds))
+        if fullest is not None:
+            recordings.append(fullest)
     return Experiment("task-safety", QUESTION, tuple(trials), tuple(recordings))
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from contactsafe.envs import ENGINES
 from contactsafe.errors import InvalidInputError
 from contactsafe.learning.observation import SCALES
+from contactsafe.parse import one_of, some_of
 
 SESSION_FIELDS = (
     "vae",
@@ -32,7 +34,7 @@ class PolicyConfig:
         vae: folder of the eyes, as `contactsafe train vae` leaves them (vae.json; encoder.onnx where it is learned).
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
-        env_id: Gymnasium id of the task.
+        env_id: Gymnasium id of the task; from Python, any that gives the same observations.
         randomise: train on worlds that differ from episode to episode; held-out boards are wiped in the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
@@ -60,7 +62,7 @@ class PolicyConfig:
     vae: Path = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
-    env_id: str = "contactsafe/Wiping-v0"
+    env_id: Annotated[str, one_of(ENGINES.values())] = "contactsafe/Wiping-v0"
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
@@ -73,7 +75,7 @@ class PolicyConfig:
     action_repeat: int = 1
     scan: float = 0.3
     reward_scale: float = 1.0
-    observes: tuple[str, ...] = ("pose", "target", "force")
+    observes: Annotated[tuple[str, ...], some_of(SCALES, " ")] = ("pose", "target", "force")
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0

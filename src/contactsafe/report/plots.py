@@ -20,18 +20,19 @@ Curve = Callable[[Recording], np.ndarray]
 
 _INK, _GRID, _BAND = "#010203", "#010204", "#010205"
 _BINS = 240
-_PANEL_IN, _NAME_IN = 1.05, 0.15  # inches: height of one panel of several, of a line of text
+_WIDTH_IN = {3: 3.5, 2: 5.4}  # inches, by columns of the page: all are shown at one scale, and so is their type
+_ALONE_IN, _PANEL_IN, _NAME_IN = 1.8, 1.15, 0.16  # inches: height of a lone panel, of one of several, of a line of text
 _LAYOUT = ConstrainedLayoutEngine(h_pad=0.03, w_pad=0.03, hspace=0.02)
 _STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "contactsafe",
-    "font.size": 8,
+    "font.size": 9,
     "axes.edgecolor": _INK,
     "axes.labelcolor": _INK,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.titlesize": 8,
+    "axes.titlesize": 9,
     "axes.titlepad": 4,
     "axes.titlelocation": "left",
     "text.color": _INK,
@@ -77,6 +78,7 @@ class Plotter:
         panels: Sequence[Panel],
         bands: Sequence[tuple[float, float]] = (),
         only: str | None = None,
+        columns: int = 2,
     ) -> str:
         """Draw panels under each other, one curve a controller, named at its end.
 
@@ -86,6 +88,7 @@ class Plotter:
             panels: what to draw, from top to bottom.
             bands: spans of time to be shaded, s.
             only: the controller to draw; all where None.
+            columns: of the page that the plot is one of, 2 or 3.
 
         Returns:
             An SVG element; empty where nothing was recorded.
@@ -93,9 +96,9 @@ class Plotter:
         recordings = [run for run in data.recorded(experiment, scenario) if only in (None, run.controller)]
         if not recordings:
             return ""
-        height = 0.5 + (1.6 if len(panels) == 1 else _PANEL_IN) * len(panels)
+        height = 0.5 + (_ALONE_IN if len(panels) == 1 else _PANEL_IN) * len(panels)
         with rc_context(_STYLE):
-            figure = Figure(figsize=(3.5, height), layout=_LAYOUT)
+            figure = Figure(figsize=(_WIDTH_IN[columns], height), layout=_LAYOUT)
             axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
             for axis, panel in zip(axes, panels, strict=True):
                 self._panel(axis, recordings, panel, bands)
@@ -138,7 +141,7 @@ class Plotter:
             name = recordings[index].controller
             axis.annotate(
                 name, (1.0, place), xycoords=("axes fraction", "data"), xytext=(4, 0), textcoords="offset points",
-                color=self._tokens[name], va="center", fontweight="bold", fontsize=8, annotation_clip=False,
+                color=self._tokens[name], va="center", fontweight="bold", fontsize=9, annotation_clip=False,
             )  # fmt: skip
 
     def _inline(self, svg: str, described: str) -> str:
@@ -161,7 +164,8 @@ class Plotter:
             svg = svg.replace(token, style)
         for name, token in self._tokens.items():
             svg = svg.replace(token, f"var({data.css_variable(name)})")
-        return re.sub(r"font: (bold |700 )?([\d.]+)px [^;\"]*", r"font: \1\2px var(--sans)", svg).strip()
+        svg = re.sub(r"font: (bold |700 )?([\d.]+)px [^;\"]*", r"font: \1\2px var(--sans)", svg)  # matplotlib to 3.10
+        return re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", svg).strip()
 
 
 def thin(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

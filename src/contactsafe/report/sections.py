@@ -123,7 +123,7 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
     if experiment.name == "disturbance":
         panels = [Panel(f"tool error, {axis} (mm)", _component("error", i, 1000.0)) for i, axis in enumerate("xyz")]
         bands = [facts["push_s"]] if facts.get("push_s") else []
-        drawn = [_titled(name, plotter.plot(experiment, name, panels, bands)) for name in names]
+        drawn = [_titled(name, plotter.plot(experiment, name, panels, bands, columns=3)) for name in names]
         said = "Departure of the tool from where it is without the push." + (" Shaded: the push." if bands else "")
         return _figure(drawn, experiment, said, "plots")
     if experiment.name == "collisions":
@@ -144,19 +144,24 @@ def _impedance(experiment: Experiment, scenario: str, plotter: Plotter) -> str:
     if not runs:
         return ""
     force = Panel("force on the tool (N)", lambda run: _length(run.trace["tool_force"], 1.0))
-    panels = [
-        force,
-        Panel("stiffness K1 towards the board, z (1/s²)", _component("K_task", 2)),
-        Panel("damping D1 towards the board, z (1/s)", _component("D_task", 2)),
-        Panel("stiffness K1 along the board, x (1/s²)", _component("K_task", 0)),
-        Panel("damping D1 along the board, x (1/s)", _component("D_task", 0)),
+    sides = [
+        [
+            force,
+            Panel("stiffness K1 towards the board, z (1/s²)", _component("K_task", 2)),
+            Panel("stiffness K1 along the board, x (1/s²)", _component("K_task", 0)),
+        ],
+        [
+            force,
+            Panel("damping D1 towards the board, z (1/s)", _component("D_task", 2)),
+            Panel("damping D1 along the board, x (1/s)", _component("D_task", 0)),
+        ],
     ]
     run = runs[-1]
     contact = spans(data.seconds(run), force.curve(run) > CONTACT_N)
-    drawn = plotter.plot(experiment, scenario, panels, contact, run.controller)
+    drawn = "".join(plotter.plot(experiment, scenario, panels, contact, run.controller) for panels in sides)
     said = f"What the policy does with its impedance, under {run.controller}, seed {run.seed}. "
     said += f"Shaded: contact, above {CONTACT_N} N."
-    return f'<figure><div class="plots">{drawn}</div><figcaption>{said}</figcaption></figure>'
+    return f'<figure><div class="plots two">{drawn}</div><figcaption>{said}</figcaption></figure>'
 
 
 def _figure(drawn: Sequence[str], experiment: Experiment, said: str, kind: str) -> str:

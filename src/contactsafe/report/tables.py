@@ -85,13 +85,13 @@ def _row(experiment: Experiment, label: str, line: Line, names: Sequence[str], o
         value = line.values.get(name)
         where = f"{experiment.name}/{line.scenario}/{name}/{row.metric}"
         exact = f' data-median="{value.median:.6g}"' if value is not None and math.isfinite(value.median) else ""
-        cells.append(f'<td data-figure="{escape(where)}"{exact}>{_spread(value, row.scale)}</td>')
-    cells += [
-        f"<td>{data.number(data.ratio(line.values.get(name), line.baseline))}{_mark(line, name)}</td>"
-        for name in others
-    ]
+        of = f'data-of="{escape(name)}" {coloured(name)}'
+        cells.append(f'<td {of} data-figure="{escape(where)}"{exact}>{_spread(value, row.scale)}</td>')
+    for name in others:
+        ratio = data.number(data.ratio(line.values.get(name), line.baseline))
+        cells.append(f'<td data-of="{escape(name)} / {BASELINE}">{ratio}{_mark(line, name)}</td>')
     aim = row.aim_in(line.scenario)
-    cells.append(f'<td class="aim">{escape(aim.text(row.unit)) if aim else ""}</td>')
+    cells.append(f'<td class="aim" data-of="aim">{escape(aim.text(row.unit))}</td>' if aim else '<td class="aim"></td>')
     return f"<tr>{''.join(cells)}</tr>"
 
 
@@ -109,7 +109,10 @@ def plain(table: Table) -> str:
     left = [i == 0 or all(isinstance(row[i], str) for row in table.rows) for i in range(len(table.columns))]
 
     def cells(row: Sequence[str | float], tag: str) -> str:
-        marks = [' class="word"' if word else "" for word in left]
+        marks = [
+            f'{" class=word" if word else ""} data-of="{escape(column)}"'
+            for word, column in zip(left, table.columns, strict=True)
+        ]
         return "".join(f"<{tag}{m}>{escape(data.cell(c))}</{tag}>" for m, c in zip(marks, row, strict=True))
 
     head = f"<tr>{cells(table.columns, 'th')}</tr>"
