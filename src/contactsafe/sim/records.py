@@ -78,6 +78,21 @@ def plant_dtype(n: int) -> np.dtype:
     )
 
 
+def plant_bounds(model: mujoco.MjModel, cameras: int) -> dict[str, tuple[int, int]]:
+    """Give what the integers of a plant that change may be, by name; the others are what the plant was made with."""
+    ticks = (-1, 2**53)
+    return {
+        "tick": ticks,
+        "push_start": ticks,
+        "push_stop": ticks,
+        "push_ramp": ticks,
+        "delay_ticks": ticks,
+        "obstacle_stopped": (0, 1),
+        "push_body": (0, model.nbody - 1),
+        "camera": (0, cameras - 1),
+    }
+
+
 report_dtype = np.dtype(
     [
         ("tool_force_mean", _f),  # of the ticks, |pad force| by the simulator, N
