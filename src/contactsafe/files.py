@@ -51,6 +51,26 @@ def cannot_write(path: object, error: OSError) -> OutputError:
 
 
 @contextlib.contextmanager
+def readable(name: str, text: str) -> Iterator[Path]:
+    """Put a text into a temporary file for as long as the block runs, for libraries that read nothing else.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="contactsafe-")
+    except OSError as error:
+        raise cannot_write("a temporary file", error) from None
+    with folder:
+        path = Path(folder.name) / name
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise cannot_write(path, error) from None
+        yield path
+
+
+@contextlib.contextmanager
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder against other processes for as long as the block runs.
 

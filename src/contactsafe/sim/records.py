@@ -78,7 +78,7 @@ def plant_dtype(n: int) -> np.dtype:
     )
 
 
-def plant_bounds(model: mujoco.MjModel, cameras: int) -> dict[str, tuple[int, int]]:
+def plant_bounds(bodies: int, cameras: int) -> dict[str, tuple[int, int]]:
     """Give what the integers of a plant that change may be, by name; the others are what the plant was made with."""
     ticks = (-1, 2**53)
     return {
@@ -88,7 +88,7 @@ def plant_bounds(model: mujoco.MjModel, cameras: int) -> dict[str, tuple[int, in
         "push_ramp": ticks,
         "delay_ticks": ticks,
         "obstacle_stopped": (0, 1),
-        "push_body": (0, model.nbody - 1),
+        "push_body": (0, bodies - 1),
         "camera": (0, cameras - 1),
     }
 

@@ -190,9 +190,10 @@ class Worlds:
 
     def parts(self) -> dict[str, Part]:
         """List what decides the worlds' future, in the order in which it must be put back."""
+        changing = plant_bounds(min(model.nbody for model in self.models), len(self.cameras.pixels))
         return {
             "physics": of_physics(self.models, self.datas),
-            "plants": of_records(self.plants, plant_bounds(self.models[0], len(self.cameras.pixels)), fixed=("",)),
+            "plants": of_records(self.plants, changing, fixed=("",)),
             "controllers": of_records(self.controllers, index_bounds(self.controllers[0]), fixed=("handle", "params")),
             "reports": of_records(self.reports),
             "cells": of_array(self.cells, CLEAN, OBJECT),
