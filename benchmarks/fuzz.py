@@ -21,9 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
+from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import ContactSafeError
 from contactsafe.learning import graph
-from contactsafe.learning.bundle import MANIFEST, POLICY, digest, shipped_bundle
+from contactsafe.learning.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
 from contactsafe.learning.policy import Policy
 
 BATCH = 50
@@ -234,13 +235,10 @@ def try_bundle(folder: Path) -> None:
     """Load a bundle and let it act, as a robot would."""
     policy = Policy(folder, HOMOGRAPHY)
     rng = np.random.default_rng(0)
-    mask = np.where(
-        rng.random((2, policy.bundle.manifest["view_size"], policy.bundle.manifest["view_size"], 1)) < 0.02, 0, 255
-    )
-    seen = {"pose": (2, 6), "target": (2, 18), "force": (2, 3)}
-    action = policy.act(
-        {name: rng.normal(size=shape) for name, shape in seen.items()} | {"mask": mask.astype(np.uint8)}
-    )
+    seen = blank_observation(policy.bundle.manifest, 2)
+    seen["mask"][rng.random(seen["mask"].shape) < 0.02] = 0
+    seen |= {name: rng.normal(size=(2, size)) for name, size in OBSERVED.items()}
+    action = policy.act(seen)
     assert action.shape == (2, 18)
     assert np.isfinite(action).all()
     assert np.abs(action).max() <= 1.0
@@ -350,15 +348,13 @@ def _spoil(state, rng):
     elif isinstance(value, np.ndarray) and rng.random() < 0.9:
         flat = value.reshape(-1)
         if value.dtype.kind in "iu":
-            flat[rng.randrange(value.size)] = np.array(rng.choice((10**9, -(10**9), 255, -1, 2**62))).astype(
-                value.dtype
-            )
+            wild = np.array(rng.choice((10**9, -(10**9), 255, -1, 2**62)))
+            flat[rng.randrange(value.size)] = wild.astype(value.dtype)
         elif value.dtype.kind == "f":
             flat[rng.randrange(value.size)] = rng.choice((np.nan, np.inf, -np.inf, 1e300, -1e9))
     elif isinstance(value, torch.Tensor) and rng.random() < 0.9:
-        place[key] = rng.choice(
-            (torch.full_like(value, 2**30), value.reshape(-1)[:1].clone(), torch.zeros(3), value * 0 - 1)
-        )
+        others = torch.full_like(value, 2**30), value.reshape(-1)[:1].clone(), torch.zeros(3), value * 0 - 1
+        place[key] = rng.choice(others)
         if value.is_floating_point() and rng.random() < 0.5:
             place[key] = value * float("nan")
     else:
@@ -376,11 +372,8 @@ def outcome(action) -> str:
         action()
     except ContactSafeError as error:
         text = str(error)
-        return (
-            "refused"
-            if "\n" not in text and len(text) <= LONGEST_LINE
-            else f"FAULT: {len(text)} characters, {text[:80]!r}"
-        )
+        short = "\n" not in text and len(text) <= LONGEST_LINE
+        return "refused" if short else f"FAULT: {len(text)} characters, {text[:80]!r}"
     except BaseException as error:
         return f"FAULT: {type(error).__name__}: {str(error)[:200]}"
     finally:

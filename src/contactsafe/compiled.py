@@ -77,11 +77,11 @@ def _root() -> pathlib.Path:
         root = pathlib.Path(caches)
     else:
         home = pathlib.Path(os.path.expanduser("~"))
-        if home.is_absolute() and not home.is_dir():
-            raise FileNotFoundError(f"the home folder {home} is not there")
+        if not (home.is_absolute() and home.is_dir()):
+            raise FileNotFoundError("this user has no home folder")
         root = home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    if root.parts[0].startswith("~"):
-        raise FileNotFoundError("this user has no home folder")
+    if str(root).startswith("~"):
+        raise FileNotFoundError(f"there is no home folder for {asked}")
     root = root.absolute()
     root.mkdir(mode=0o755, parents=True, exist_ok=True)
     root = root.resolve()

@@ -44,7 +44,8 @@ class _SnapshotError(InvalidInputError):
     """A value that cannot be put back, and the names of the parts it lies in."""
 
     def __init__(self, what: str, *path: str):
-        super().__init__(f"{'.'.join(path)}: the snapshot holds {what}; start anew")
+        place = f" ({'.'.join(path)})" if path else ""
+        super().__init__(f"the snapshot holds {what}{place}; start anew")
         self.what, self.path = what, path
 
 
@@ -189,7 +190,7 @@ def _fill(array: np.ndarray, value: np.ndarray) -> None:
 def _check_array(array: np.ndarray, value: np.ndarray, low: float, high: float) -> None:
     if not isinstance(value, np.ndarray) or array.shape != value.shape:
         found = f"an array {value.shape}" if isinstance(value, np.ndarray) else shown(value)
-        raise _SnapshotError(f"{found} for an array {array.shape}")
+        raise InvalidInputError(f"the snapshot holds {found} for one of {array.shape}; start anew")
     if value.dtype != array.dtype:
         raise _SnapshotError(f"{value.dtype} for {array.dtype}")
     # A truth is a byte, in which compiled code may find nothing but 0 and 1; NaN is outside whatever the bounds are.
