@@ -177,15 +177,19 @@ def _read_bounded(folder, name, limit):
         if real.parent != folder.resolve():
             raise BundleError(f"{path} is a link to another folder; copy the file itself")
         # Not to wait at a pipe, nor to be led elsewhere since.
-        with open(os.open(real, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC), "rb") as file:
-            found = os.fstat(file.fileno())
+        handle = os.open(real, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            found = os.fstat(handle)
             if not stat.S_ISREG(found.st_mode):
                 raise BundleError(f"{path} is not a file; copy or export the bundle anew")
             if found.st_size > limit:
                 raise BundleError(
                     f"{path} has {found.st_size} bytes, at most {limit} are allowed; this is not a bundle of ours"
                 )
-            return file.read(limit)
+            with open(handle, "rb", closefd=False) as file:
+                return file.read(limit)
+        finally:
+            os.close(handle)
     except FileNotFoundError:
         raise BundleError(f"{path} is missing; the bundle is incomplete, copy or export it anew") from None
     except (OSError, RuntimeError) as error:  # a RuntimeError is a circle of links

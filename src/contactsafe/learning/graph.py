@@ -189,7 +189,8 @@ def _check_opsets(model: Any) -> None:
     found = [(opset.domain.decode(errors="replace"), opset.version) for opset in model.opset_import]
     if len(found) != 1 or found[0][0] != "" or not OPSETS[0] <= found[0][1] <= OPSETS[1]:
         raise _ModelError(
-            f"needs operators of {shown(found)}, and ONNX's own of version {OPSETS[0]} to {OPSETS[1]} are allowed"
+            f"is not a model ONNX Runtime takes (it needs operators of {shown(found)}; allowed are ONNX's own of "
+            f"version {OPSETS[0]} to {OPSETS[1]})"
         )
 
 

@@ -34,7 +34,7 @@ class EventFile:
         name = f"events.out.tfevents.{time.time():.0f}.{socket.gethostname()}.{os.getpid()}.{next(self._number)}"
         self._path = Path(folder) / name
         with self._told():
-            self._file = self._path.open("wb", buffering=0)
+            self._file = self._path.open("wb")
         self._writer = RecordWriter(self._file)
         self._add(file_version="brain.Event:2")
         if hidden_from is not None:
@@ -53,6 +53,7 @@ class EventFile:
     def _add(self, **event):
         with self._told():
             self._writer.write(event_pb2.Event(wall_time=time.time(), **event).SerializeToString())
+            self._file.flush()
 
     @contextlib.contextmanager
     def _told(self):

@@ -61,7 +61,8 @@ def load_run(config, encoder_digest):
         raise InvalidInputError(
             f"{config.out} holds a run of {shown(algorithm)[1:-1]}, not of {config.algorithm}; give another --out"
         )
-    check_same_config(settings, config, SESSION_FIELDS)
+    with refused_as(config.out):
+        check_same_config(settings, config, SESSION_FIELDS)
     if encoder != encoder_digest:
         raise InvalidInputError(
             f"the encoder in {config.vae} is not the one that the run in {config.out} was started with; "
