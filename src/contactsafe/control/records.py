@@ -220,7 +220,7 @@ def controller_dtype(n: int) -> np.dtype:
     )
 
 
-def index_bounds(controller) -> dict[str, tuple[int, int]]:
+def index_bounds(controller) -> dict[str, tuple[float, float]]:
     """Give what those integers of a `controller_dtype` record may be that compiled code uses as an index, by name."""
     n, points = len(controller["state"]["tau"]), int(controller["handle"]["skin_points"])
     return {

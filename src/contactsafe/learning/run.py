@@ -207,7 +207,10 @@ class Run:
 
     def _check_env(self, env):
         """Check what decides the environment's future, and the observation it gave last."""
-        self.env.check(part(env, "below", dict))
+        try:
+            self.env.check(part(env, "below", dict))
+        except InvalidInputError as error:
+            raise CheckpointError(str(error).removesuffix("; start anew")) from None
         if self.env.keeps_worlds:
             n, space = self.env.num_envs, self.env.observation_space
             for name, shape, kind in (

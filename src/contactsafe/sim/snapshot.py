@@ -34,10 +34,13 @@ class Part(NamedTuple):
 
 
 Parts = Mapping[str, Part]
-Bounds = Mapping[str, tuple[int, int]]
+Bounds = Mapping[str, tuple[float, float]]
 
 COUNT = (-1, 2**53)
 """Bounds of integers that count and index nothing."""
+
+MEASURE = (-1e9, 1e9)
+"""Bounds of numbers with a unit: what is beyond is no state of a simulation, but overflows somewhere."""
 
 
 class _SnapshotError(InvalidInputError):
@@ -88,7 +91,7 @@ def of_object(owner: Any) -> Part:
     )
 
 
-def of_array(array: np.ndarray, low: float = -np.inf, high: float = np.inf) -> Part:
+def of_array(array: np.ndarray, low: float = MEASURE[0], high: float = MEASURE[1]) -> Part:
     """Let an array be a part; it is filled in place, with nothing outside [low, high]."""
     return Part(array.copy, lambda value: _fill(array, value), lambda value: _check_array(array, value, low, high))
 
@@ -98,20 +101,25 @@ def of_records(records: np.ndarray, bounds: Bounds | None = None, fixed: tuple[s
 
     Args:
         records: of a structured dtype.
-        bounds: by name of a field of integers, what it may be, both ends included; others are counts.
-        fixed: beginnings of the names of fields of which the integers are what they were made, such as addresses in
-            arrays.
+        bounds: by name of a field, what it may be, both ends included; else COUNT for integers and MEASURE for others,
+            of which a single number may also be inf, which stands for "no bound".
+        fixed: beginnings of the names of fields that, unless they have bounds, are what the records were made with,
+            such as places in arrays.
     """
     known = bounds or {}
 
+    def part(name: str, field: np.ndarray) -> Part:
+        plain = of_array(field, *known.get(name, COUNT if field.dtype.kind in "iu" else MEASURE))
+        if name in known:
+            return plain
+        if name.startswith(fixed):
+            return plain._replace(check=functools.partial(_check_same, field))
+        if field.ndim == 1 and field.dtype.kind == "f":
+            return plain._replace(check=lambda value: plain.check(_without_inf(value)))
+        return plain
+
     def fields() -> dict[str, Part]:
-        parts = {}
-        for name, field in _fields(records):
-            low, high = known.get(name, COUNT) if field.dtype.kind in "iu" else (-np.inf, np.inf)
-            parts[name] = of_array(field, low, high)
-            if field.dtype.kind in "iu" and name not in known and name.startswith(fixed):
-                parts[name] = parts[name]._replace(check=functools.partial(_check_same, field))
-        return parts
+        return {name: part(name, field) for name, field in _fields(records)}
 
     return Part(
         lambda: {name: field.copy() for name, field in _fields(records)},
@@ -198,6 +206,11 @@ def _check_array(array: np.ndarray, value: np.ndarray, low: float, high: float) 
     outside = ~((numbers >= low) & (numbers <= most))
     if outside.any():
         raise _SnapshotError(f"{shown(value[outside][0].item())}, which cannot be")
+
+
+def _without_inf(value: Any) -> Any:
+    is_measure = isinstance(value, np.ndarray) and value.dtype.kind == "f"
+    return np.where(np.isposinf(value), 0.0, value) if is_measure else value
 
 
 def _check_same(array: np.ndarray, value: np.ndarray) -> None:

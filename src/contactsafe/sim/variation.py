@@ -65,7 +65,7 @@ class Variation:
             "drawn": Part(self._taken, self._put_drawn, self._check_drawn),
             "frames": of_array(self._frames),
             "newest": of_array(self._newest, 0, MAX_DELAY_STEPS),
-            "random": of_array(self._random.view(np.int64)),
+            "random": of_array(self._random.view(np.int64), -np.inf, np.inf),
         }
 
     def snapshot(self) -> dict[str, Any]:
