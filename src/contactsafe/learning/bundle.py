@@ -116,11 +116,11 @@ class Bundle:
         """
         folder = Path(folder)
         try:
-            there = (folder / MANIFEST).exists()
+            missing = None if (folder / MANIFEST).exists() else _what_is_there(folder)
         except OSError as error:
             raise BundleError(f"{folder} cannot be read: {error.strerror}; check who may read it") from None
-        if not there:
-            raise BundleError(_what_is_there(folder))
+        if missing:
+            raise BundleError(missing)
         manifest = _read_manifest(folder)
         encoder = None
         if manifest["representation"] in LEARNED:
@@ -165,8 +165,8 @@ def _what_is_there(folder):
     return f"{folder / MANIFEST} is missing; the bundle is incomplete, copy or export it anew"
 
 
-def _read_bounded(folder, name, limit):
-    """Read a file that lies in a folder, of at most so many bytes.
+def read_bounded(folder, name, limit):
+    """Read a file that lies in a folder (a Path), of at most so many bytes.
 
     Raises:
         BundleError: it is missing, too large, no file, a link out of the folder, or cannot be read.
@@ -200,7 +200,7 @@ def _read_bounded(folder, name, limit):
 def _read_manifest(folder):
     path = folder / MANIFEST
     try:
-        manifest = json.loads(_read_bounded(folder, MANIFEST, MAX_MANIFEST_BYTES), object_pairs_hook=_once)
+        manifest = json.loads(read_bounded(folder, MANIFEST, MAX_MANIFEST_BYTES), object_pairs_hook=_once)
     except _TwiceError as twice:
         raise BundleError(
             f"{path} says {shown(str(twice))} twice; the bundle is damaged, copy or export it anew"
@@ -256,7 +256,7 @@ def _once(pairs):
 def _read_model(folder, name, files, inputs, outputs):
     """Read one of the models, and start it once it is known to be what bundle.json says and to have these ports."""
     path = folder / name
-    data = _read_bounded(folder, name, MAX_MODEL_BYTES)
+    data = read_bounded(folder, name, MAX_MODEL_BYTES)
     entry = files.get(name)
     if not isinstance(entry, dict) or entry.get("bytes") != len(data) or entry.get("sha256") != digest(data):
         raise BundleError(

@@ -87,7 +87,7 @@ class Curves(KVWriter):
 
 def _let_the_second_pass(folder):
     """Wait until a new log comes after those that are there: TensorBoard goes by the second in their names."""
-    begun = [int(path.name.split(".")[3]) for path in Path(folder).glob("events.out.tfevents.*")]
+    begun = [int(path.name.split(".")[3]) for path in Path(folder).glob("events.out.tfevents.[0-9]*.*")]
     left = max(begun, default=0) + 1 - time.time()
     if 0.0 < left <= 1.0:
         time.sleep(left)

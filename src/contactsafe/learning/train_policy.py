@@ -8,8 +8,16 @@ import torch
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
-from contactsafe.errors import InvalidInputError, shown
-from contactsafe.learning.bundle import FOLDER, MAX_LATENT, digest
+from contactsafe.errors import BundleError, InvalidInputError, shown
+from contactsafe.learning.bundle import (
+    ENCODER,
+    FOLDER,
+    MAX_LATENT,
+    MAX_MANIFEST_BYTES,
+    MAX_MODEL_BYTES,
+    digest,
+    read_bounded,
+)
 from contactsafe.learning.checkpoints import CHECKPOINT, plain, run_folder, write_json
 from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
@@ -81,11 +89,12 @@ class _Eyes:
     @classmethod
     def load(cls, folder):
         try:
-            text = (folder / "vae.json").read_bytes()
+            text = read_bounded(folder, "vae.json", MAX_MANIFEST_BYTES)
             vae = json.loads(text)
-            encoder = (folder / "encoder.onnx").read_bytes() if vae["representation"] in LEARNED else None
+            learned = vae["representation"] in LEARNED
+            encoder = read_bounded(folder, ENCODER, MAX_MODEL_BYTES) if learned else None
             version = vae["format"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (BundleError, ValueError, KeyError, TypeError, RecursionError) as error:
             remedy = f"run `contactsafe train vae --out {folder}` first"
             if (folder / CHECKPOINT).exists():
                 remedy = "it is a run; give the folder in which `contactsafe train vae` has come to its end"
@@ -122,7 +131,7 @@ def _encoded(raw_env, eyes, config):
     vae = eyes.vae
     session = None
     if eyes.encoder is not None:
-        name = str(config.vae / "encoder.onnx")
+        name = str(config.vae / ENCODER)
         graph = read_graph(eyes.encoder, name)
         check_ports(graph, name, *encoder_ports(vae["size"], len(vae["latent_mean"])))
         session = open_session(graph, name, config.encoder_threads)
