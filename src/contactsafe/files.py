@@ -30,18 +30,27 @@ def write_whole(path: Path, data: bytes) -> None:
         OutputError: it cannot be written, as on a full disk; the file is as it was.
     """
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(name, 0o666 & ~_umask())
-            os.replace(name, path)
-        finally:
-            Path(name).unlink(missing_ok=True)  # gone already where all went well
+        replace(path, data)
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+def replace(path: Path, data: bytes) -> None:
+    """Do as `write_whole` does, for callers with words of their own.
+
+    Raises:
+        OSError: it cannot be written; the file is as it was.
+    """
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    finally:
+        Path(name).unlink(missing_ok=True)  # gone already where all went well
 
 
 def cannot_write(path: object, error: OSError) -> OutputError:

@@ -400,6 +400,7 @@ def test_what_onnx_runtime_gets_is_what_was_read(bundle):
     names = {field.name for field, _ in onnx.load_from_string(model).graph.ListFields()}
     assert names == {"node", "name", "initializer", "doc_string", "input", "output"}
     onnx.checker.check_model(onnx.load_from_string(model))
+    assert read_graph(model, "policy").model == model
 
 
 @pytest.mark.parametrize("name", ["bundle.json", "policy.onnx"])

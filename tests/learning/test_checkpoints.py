@@ -105,7 +105,7 @@ def test_a_flipped_bit_is_refused(run, place):
     (config.out / CHECKPOINT).write_bytes(data)
     assert refusal(config) in (
         "is damaged (its SHA-256 differs); start anew with another --out",
-        "is not a checkpoint of this version; start anew with another --out",
+        "cannot be read as a checkpoint; start anew with another --out",
     )
 
 
@@ -113,7 +113,7 @@ def test_a_flipped_bit_is_refused(run, place):
 def test_what_is_no_checkpoint_is_refused(run, data):
     config = run("ppo")
     (config.out / CHECKPOINT).write_bytes(data)
-    assert refusal(config) == "is not a checkpoint of this version; start anew with another --out"
+    assert refusal(config) == "cannot be read as a checkpoint; start anew with another --out"
 
 
 def sealed(data):

@@ -106,7 +106,7 @@ def load_checkpoint(out):
         raise InvalidInputError(f"{path} cannot be read: {error.strerror}; check who may read it") from None
     sealed = _SEALED.fullmatch(seal)
     if sealed is None:
-        raise InvalidInputError(f"{path} is not a checkpoint of this version; start anew with another --out")
+        raise InvalidInputError(f"{path} cannot be read as a checkpoint; start anew with another --out")
     if sealed[1].decode() != hashlib.sha256(data).hexdigest():
         raise InvalidInputError(f"{path} is damaged (its SHA-256 differs); start anew with another --out")
     try:

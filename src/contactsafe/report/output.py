@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 from contactsafe.errors import OutputError
-from contactsafe.files import write_whole as write_bytes
+from contactsafe.files import replace
 
 _REMEDY = "give a folder you may write to with --out"
 
@@ -29,8 +29,7 @@ def prepare_output(folder) -> Path:
         os.close(handle)
         os.unlink(name)
     except OSError as error:
-        reason = (error.strerror or type(error).__name__).lower()
-        raise OutputError(f"cannot write to {folder}: {reason}; {_REMEDY}") from None
+        raise OutputError(f"cannot write to {folder}: {_reason(error)}; {_REMEDY}") from None
     return folder.resolve()
 
 
@@ -44,5 +43,12 @@ def write_whole(path: Path, text: str) -> Path:
     Raises:
         OutputError: it cannot be written; the file is as it was.
     """
-    write_bytes(path, text.encode())
+    try:
+        replace(path, text.encode())
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {_reason(error)}; {_REMEDY}") from None
     return path
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or type(error).__name__).lower()

@@ -76,7 +76,7 @@ def check(parts: Parts, snapshot: Mapping[str, Any]) -> None:
     """
     if not isinstance(snapshot, Mapping) or set(parts) != set(snapshot):
         found = ", ".join(sorted(map(str, snapshot))) if isinstance(snapshot, Mapping) else shown(snapshot)
-        raise _SnapshotError(f"{found[:160]}, not {', '.join(sorted(parts))}")
+        raise _SnapshotError(f"{found[:160]}, not {', '.join(sorted(parts))[:160]}")
     for name, part in parts.items():
         try:
             part.check(snapshot[name])
