@@ -129,6 +129,8 @@ def _claimed(folder: pathlib.Path) -> pathlib.Path:
 def _private_folder(name: str, reason: OSError) -> str:
     """Give a folder for this process and those it starts, and say so once."""
     handed = os.environ.get(_HANDED_DOWN)
+    if handed == os.devnull:
+        return handed
     if handed and pathlib.Path(handed).name.startswith(name):
         with contextlib.suppress(OSError):
             if pathlib.Path(handed).is_dir():
@@ -138,8 +140,9 @@ def _private_folder(name: str, reason: OSError) -> str:
         folder = _claimed(pathlib.Path(tempfile.mkdtemp(prefix=f"{name}-")))
         _forget_old(folder.parent, 0)
     except OSError:
+        os.environ[_HANDED_DOWN] = os.devnull  # under which nothing can be kept
         _say_uncached(reason)
-        return os.devnull  # under which nothing can be kept
+        return os.devnull
     os.environ[_HANDED_DOWN] = str(folder)
     owner = os.getpid()
     atexit.register(lambda: _remove(folder) if os.getpid() == owner else None)
@@ -151,8 +154,9 @@ def _say_uncached(reason: OSError) -> None:
     if _said:
         return
     _said.append(reason)
+    why = f"{reason.filename}: {reason.strerror}" if reason.filename else reason.strerror or reason
     print(
-        f"contactsafe: compiled code cannot be kept ({reason.strerror or reason}), so every run compiles anew; "
+        f"contactsafe: compiled code cannot be kept ({why}), so every run compiles anew; "
         "set NUMBA_CACHE_DIR to a folder that you alone may write to",
         file=sys.stderr,
     )

@@ -138,6 +138,16 @@ def test_a_cache_folder_that_somebody_else_may_have_filled_is_not_used(tmp_path,
     assert capsys.readouterr().err == ""
 
 
+def test_without_any_folder_every_process_compiles_and_it_is_said_once(monkeypatch, private, capsys):
+    monkeypatch.setattr(compiled, "_check_parents", lambda root: (_ for _ in ()).throw(PermissionError("shared")))
+    assert compiled._cache_folder() == os.devnull
+    assert say_once(capsys) == "shared"
+    monkeypatch.setattr(compiled, "_said", [])
+    assert compiled._cache_folder() == os.devnull  # as a worker would
+    assert capsys.readouterr().err == ""
+    assert list(private.iterdir()) == []
+
+
 @pytest.mark.parametrize(("mode", "allowed"), [(0o1777, True), (0o777, False), (0o755, True)])
 def test_a_shared_folder_serves_only_where_others_cannot_exchange_what_is_in_it(tmp_path, mode, allowed):
     shared = tmp_path / "shared"
