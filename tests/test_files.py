@@ -129,6 +129,14 @@ def test_a_lock_that_says_nonsense_is_told_without_a_traceback(tmp_path, holder)
         pass
 
 
+def test_a_lock_that_is_a_link_to_somebodys_file_is_not_written_to(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    (tmp_path / LOCK).symlink_to("thesis.tex")
+    with pytest.raises(OutputError, match=f"^cannot write {tmp_path}/{LOCK}: "), held(tmp_path):
+        pass
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
 class Hostile:
     def __repr__(self):
         raise RuntimeError

@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import math
+import os
 import random
 import re
 import tempfile
@@ -66,7 +67,7 @@ def run_folder(out, resume) -> Iterator[Path]:
         InvalidInputError: resume is true and there is no checkpoint.
     """
     out = Path(out)
-    if resume and not (out / CHECKPOINT).is_file():
+    if resume and not os.path.isfile(out / CHECKPOINT):
         raise InvalidInputError(f"no {CHECKPOINT} in {out} to resume from; leave --resume out to start anew")
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -355,7 +356,7 @@ def as_started(config):
     Raises:
         InvalidInputError: its checkpoint cannot be read.
     """
-    if not (Path(config.out) / CHECKPOINT).is_file():
+    if not os.path.isfile(Path(config.out) / CHECKPOINT):
         return config
     state = load_checkpoint(config.out)
     if state.get("algorithm") != getattr(config, "algorithm", None):
