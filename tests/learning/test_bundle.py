@@ -371,6 +371,16 @@ def test_nan_weights_are_refused(bundle):
     assert crafted(bundle, change) == "has weights 'layers.0.bias' that are not finite; export it anew"
 
 
+def test_weights_given_out_as_an_action_are_refused(bundle):
+    def change(model):
+        del model.graph.node[:]
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.zeros(18, np.float32), "action"))
+
+    assert (
+        crafted(bundle, change) == "has an output 'action' of shape [None, 18] that it does not compute; export it anew"
+    )
+
+
 def test_a_value_used_before_it_is_computed_is_refused(bundle):
     def turn(model):
         nodes = list(model.graph.node)[::-1]

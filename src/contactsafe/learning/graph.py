@@ -151,7 +151,8 @@ def _read(data: bytes) -> Graph:
         raise _ModelError("holds more than a graph of operators (functions, subgraphs or notes)")
     outputs = {port.name: _port(port) for port in graph.output}
     for name, (_, shape) in outputs.items():
-        if name not in values or tuple(shape[1:]) != values[name].shape:
+        value = values.get(name)
+        if value is None or value.constant is not None or not shape or value.shape != tuple(shape[1:]):
             raise _ModelError(f"has an output {shown(name)} of shape {shown(shape)} that it does not compute")
     given = len(graph.input) + len(graph.initializer) + sum(len(node.output) for node in graph.node)
     if len(values) != given or len(outputs) != len(graph.output) or "" in values:
