@@ -25,6 +25,7 @@ from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import ContactSafeError
 from contactsafe.learning import graph
 from contactsafe.learning.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
+from contactsafe.learning.operators import RULES
 from contactsafe.learning.policy import Policy
 
 BATCH = 50
@@ -127,7 +128,7 @@ def _add_operators(folder, rng):
     model.ParseFromString((folder / POLICY).read_bytes())
     names = [name for node in model.graph.node for name in node.output]
     kind = rng.choice(
-        (*graph.RULES, "Loop", "If", "Scan", "Tile", "Expand", "ConstantOfShape", "Range", "Resize", "Gather", "Einsum")
+        (*RULES, "Loop", "If", "Scan", "Tile", "Expand", "ConstantOfShape", "Range", "Resize", "Gather", "Einsum")
     )
     value = rng.choice((*names, *(tensor.name for tensor in model.graph.initializer)))
     for k in range(rng.choice((1, 40, 300))):

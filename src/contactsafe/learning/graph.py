@@ -10,7 +10,6 @@ ONNX Runtime gets the model written anew from what was read: nothing that was no
 
 import functools
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
 
 from contactsafe.errors import BundleError, shown
+from contactsafe.learning.operators import FLOAT, RULES, Call, NotAllowed, Value
 
 OPSETS = (13, 23)
 """Versions of ONNX's own operators that are read; exported is 18."""
@@ -30,8 +30,8 @@ MAX_ROW_NUMBERS = 16_000_000
 MAX_ROW_PRODUCTS = 1_000_000_000
 """Most multiplications for one row of the batch: about a second's work."""
 
-_FLOAT, _UINT8, _INT64 = 1, 2, 7
-KINDS = {_FLOAT: "float", _UINT8: "uint8", _INT64: "int64"}
+_UINT8, _INT64 = 2, 7
+KINDS = {FLOAT: "float", _UINT8: "uint8", _INT64: "int64"}
 """Types of numbers by ONNX's code."""
 
 _SCHEMA = {
@@ -66,13 +66,6 @@ class Graph(NamedTuple):
     model: bytes
     inputs: dict[str, tuple[str, list]]
     outputs: dict[str, tuple[str, list]]
-
-
-class _Value(NamedTuple):
-    """What is known of a value beforehand: its shape, without the batch where it has rows, and a constant's numbers."""
-
-    shape: tuple[int, ...]
-    constant: np.ndarray | None = None
 
 
 class _ModelError(Exception):
@@ -145,7 +138,7 @@ def _read(data: bytes) -> Graph:
     for name, (_, shape) in inputs.items():
         if name in values or not shape or None in shape[1:]:
             raise _ModelError(f"has an input {shown(name)} of shape {shown(shape)}")
-        values[name] = _Value(tuple(shape[1:]))
+        values[name] = Value(tuple(shape[1:]))
     _check_nodes(graph.node, values)
     if model.ByteSize() != size:
         raise _ModelError("holds more than a graph of operators (functions, subgraphs or notes)")
@@ -195,16 +188,16 @@ def _check_opsets(model: Any) -> None:
         )
 
 
-def _constant(tensor: Any) -> _Value:
+def _constant(tensor: Any) -> Value:
     """Read the numbers of a tensor that stands in the file."""
     name = shown(tensor.name)
     if tensor.external_data or tensor.data_location:
         raise _ModelError("keeps weights in another file", "export it with the weights inside")
     shape = tuple(tensor.dims)
-    if tensor.data_type not in (_FLOAT, _INT64) or len(shape) > MAX_RANK or any(size < 1 for size in shape):
+    if tensor.data_type not in (FLOAT, _INT64) or len(shape) > MAX_RANK or any(size < 1 for size in shape):
         raise _ModelError(f"has weights {name} of type {tensor.data_type} and shape {shown(shape)}")
-    kind = np.dtype("<f4" if tensor.data_type == _FLOAT else "<i8")
-    listed = tensor.float_data if tensor.data_type == _FLOAT else tensor.int64_data
+    kind = np.dtype("<f4" if tensor.data_type == FLOAT else "<i8")
+    listed = tensor.float_data if tensor.data_type == FLOAT else tensor.int64_data
     given = [bool(tensor.raw_data), bool(tensor.float_data), bool(tensor.int64_data)]
     length = len(tensor.raw_data) / kind.itemsize if tensor.raw_data else len(listed)
     if sum(given) != 1 or length != math.prod(shape):
@@ -212,7 +205,7 @@ def _constant(tensor: Any) -> _Value:
     numbers = np.frombuffer(tensor.raw_data, kind) if tensor.raw_data else np.array(listed, kind)
     if not np.isfinite(numbers).all():
         raise _ModelError(f"has weights {name} that are not finite")
-    return _Value(shape, numbers.reshape(shape))
+    return Value(shape, numbers.reshape(shape))
 
 
 def _port(port: Any) -> tuple[str, list]:
@@ -223,7 +216,7 @@ def _port(port: Any) -> tuple[str, list]:
     return f"tensor({KINDS.get(tensor.elem_type, tensor.elem_type)})", shape
 
 
-def _check_nodes(nodes: Any, values: dict[str, _Value]) -> None:
+def _check_nodes(nodes: Any, values: dict[str, Value]) -> None:
     """Follow shapes through the operators, in their order, and add up what they cost; values are added to `values`."""
     if len(nodes) > MAX_NODES:
         raise _ModelError(f"has {len(nodes)} operators, at most {MAX_NODES} are allowed")
@@ -239,8 +232,8 @@ def _check_nodes(nodes: Any, values: dict[str, _Value]) -> None:
         if unknown:
             raise _ModelError(f"uses {shown(unknown[0])} before it is computed")
         try:
-            shapes, cost = rule(_Call(node, [values[name] if name else None for name in node.input]))
-        except (_ModelError, IndexError, TypeError, ValueError, OverflowError):
+            shapes, cost = rule(Call(node, [values[name] if name else None for name in node.input]))
+        except (NotAllowed, IndexError, TypeError, ValueError, OverflowError):
             raise _ModelError(f"has an operator {node.op_type} of a kind that nothing here exports") from None
         if len(shapes) != len(node.output) or any(
             len(shape) > MAX_RANK or min(shape, default=1) < 1 for shape in shapes
@@ -252,208 +245,4 @@ def _check_nodes(nodes: Any, values: dict[str, _Value]) -> None:
             raise _ModelError(
                 f"computes more than {MAX_ROW_NUMBERS} numbers or {MAX_ROW_PRODUCTS} products for one observation"
             )
-        values.update(zip(node.output, map(_Value, shapes), strict=True))
-
-
-class _Call:
-    """An operator where it is used: its inputs, None for one left out, and its attributes."""
-
-    def __init__(self, node: Any, inputs: list[_Value | None]):
-        self.inputs, self.outputs = inputs, len(node.output)
-        self._attributes = {attribute.name: attribute for attribute in node.attribute}
-        if len(self._attributes) != len(node.attribute):
-            raise _ModelError
-
-    def rows(self, i: int) -> tuple[int, ...]:
-        """Give the shape of input i, which has a row for each of the batch; without the batch."""
-        value = self.inputs[i]
-        if value is None or value.constant is not None:
-            raise _ModelError
-        return value.shape
-
-    def constant(self, i: int) -> np.ndarray:
-        """Give input i, which is a constant."""
-        value = self.inputs[i]
-        if value is None or value.constant is None:
-            raise _ModelError
-        return value.constant
-
-    def number(self, name: str, default: int) -> int:
-        """Give an attribute that is a whole number."""
-        return self._attributes[name].i if name in self._attributes else default
-
-    def numbers(self, name: str, default: list[int]) -> list[int]:
-        """Give an attribute that is a list of whole numbers."""
-        return list(self._attributes[name].ints) if name in self._attributes else default
-
-    def axis(self, axis: int, rank: int) -> int:
-        """Give the place of an axis in a shape without the batch; the batch itself is no axis to work along."""
-        axis = axis + rank + 1 if axis < 0 else axis
-        if not 1 <= axis <= rank:
-            raise _ModelError
-        return axis - 1
-
-    def text(self, name: str, default: bytes) -> bytes:
-        """Give an attribute that is a text."""
-        return self._attributes[name].s if name in self._attributes else default
-
-
-Shapes = tuple[list[tuple[int, ...]], int]
-"""Shapes of what comes out, without the batch, and how many multiplications that takes."""
-
-
-def _same(call: _Call) -> Shapes:
-    return [call.rows(0)], math.prod(call.rows(0))
-
-
-def _cast(call: _Call) -> Shapes:
-    if call.number("to", 0) != _FLOAT:
-        raise _ModelError
-    return _same(call)
-
-
-def _clip(call: _Call) -> Shapes:
-    for i in range(1, len(call.inputs)):
-        if call.inputs[i] is not None and call.constant(i).size != 1:
-            raise _ModelError
-    return _same(call)
-
-
-def _broadcast(call: _Call) -> Shapes:
-    """Spread constants over rows; rows meet rows of the same rank."""
-    given = [value for value in call.inputs if value is not None]
-    ranks = {len(value.shape) for value in given if value.constant is None}
-    (rank,) = ranks  # one, and there is one
-    shapes = []
-    for value in given:
-        shape = value.shape
-        if value.constant is not None and len(shape) > rank:
-            if len(shape) > rank + 1 or shape[0] != 1:
-                raise _ModelError
-            shape = shape[1:]
-        shapes.append(shape)
-    shape = np.broadcast_shapes(*shapes)
-    return [shape], math.prod(shape) * len(shapes)
-
-
-def _concat(call: _Call) -> Shapes:
-    shapes = [call.rows(i) for i in range(len(call.inputs))]
-    along = call.axis(call.number("axis", 0), len(shapes[0]))
-    if len({(*shape[:along], *shape[along + 1 :], len(shape)) for shape in shapes}) != 1:
-        raise _ModelError
-    first = shapes[0]
-    return [(*first[:along], sum(shape[along] for shape in shapes), *first[along + 1 :])], 0
-
-
-def _gemm(call: _Call) -> Shapes:
-    (k,) = call.rows(0)
-    weights = call.constant(1)
-    weights = weights.T if call.number("transB", 0) else weights
-    biased = len(call.inputs) < 3 or call.inputs[2] is None or call.constant(2).shape in ((weights.shape[1],), (1,), ())
-    if weights.ndim != 2 or weights.shape[0] != k or call.number("transA", 0) or not biased:
-        raise _ModelError
-    return [(weights.shape[1],)], weights.size
-
-
-def _matmul(call: _Call) -> Shapes:
-    (k,) = call.rows(0)
-    weights = call.constant(1)
-    if weights.ndim != 2 or weights.shape[0] != k:
-        raise _ModelError
-    return [(weights.shape[1],)], weights.size
-
-
-def _conv(call: _Call) -> Shapes:
-    channels, *size = call.rows(0)
-    weights = call.constant(1)
-    group, kernel = call.number("group", 1), list(weights.shape[2:])
-    strides, dilations = call.numbers("strides", [1, 1]), call.numbers("dilations", [1, 1])
-    pads = call.numbers("pads", [0, 0, 0, 0])
-    plain = (
-        len(size) == 2 and weights.ndim == 4 and len(strides) == 2 and len(pads) == 4 and dilations == [1, 1]
-        and call.numbers("kernel_shape", kernel) == kernel and call.text("auto_pad", b"NOTSET") == b"NOTSET"
-        and 1 <= group <= channels and weights.shape[1] * group == channels and weights.shape[0] % group == 0
-        and min(strides) >= 1 and all(0 <= pad < edge for pad, edge in zip(pads, 2 * kernel, strict=True))
-        and (len(call.inputs) < 3 or call.constant(2).shape == weights.shape[:1])
-    )  # fmt: skip
-    if not plain:
-        raise _ModelError
-    out = [(size[k] + pads[k] + pads[k + 2] - kernel[k]) // strides[k] + 1 for k in (0, 1)]
-    return [(weights.shape[0], *out)], weights.size * math.prod(out)
-
-
-def _layer_norm(call: _Call) -> Shapes:
-    shape = call.rows(0)
-    call.axis(call.number("axis", -1), len(shape))
-    for i in range(1, len(call.inputs)):
-        if np.broadcast_shapes(call.constant(i).shape, shape) != shape:
-            raise _ModelError
-    return [shape], 4 * math.prod(shape)
-
-
-def _unsqueeze(call: _Call) -> Shapes:
-    shape = list(call.rows(0))
-    axes = call.constant(1).reshape(-1).tolist()
-    for axis in sorted(call.axis(axis, len(shape) + len(axes)) for axis in axes):
-        shape.insert(axis, 1)
-    return [tuple(shape)], 0
-
-
-def _squeeze(call: _Call) -> Shapes:
-    shape = call.rows(0)
-    gone = {call.axis(axis, len(shape)) for axis in call.constant(1).reshape(-1).tolist()}
-    if any(shape[k] != 1 for k in gone):
-        raise _ModelError
-    return [tuple(size for k, size in enumerate(shape) if k not in gone)], 0
-
-
-def _flatten(call: _Call) -> Shapes:
-    if call.number("axis", 1) != 1:
-        raise _ModelError
-    return [(math.prod(call.rows(0)),)], 0
-
-
-def _reshape(call: _Call) -> Shapes:
-    """Allow [-1, sizes] and [0, sizes]: the rows stay."""
-    shape = call.rows(0)
-    batch, *wanted = call.constant(1).reshape(-1).tolist()
-    if batch not in (-1, 0) or (call.number("allowzero", 0) and batch == 0):
-        raise _ModelError
-    if batch == 0 and wanted.count(-1) == 1:
-        rest = -math.prod(wanted)
-        wanted[wanted.index(-1)] = math.prod(shape) // max(rest, 1)
-    if min(wanted, default=1) < 1 or math.prod(wanted) != math.prod(shape):
-        raise _ModelError
-    return [tuple(wanted)], 0
-
-
-def _split(call: _Call) -> Shapes:
-    shape = call.rows(0)
-    along = call.axis(call.number("axis", 0), len(shape))
-    if len(call.inputs) > 1:
-        sizes = call.constant(1).reshape(-1).tolist()
-    else:
-        sizes = [shape[along] // call.outputs] * call.outputs
-    if sum(sizes) != shape[along] or call.number("num_outputs", len(sizes)) != len(sizes):
-        raise _ModelError
-    return [(*shape[:along], size, *shape[along + 1 :]) for size in sizes], 0
-
-
-RULES: dict[str, Callable[[_Call], Shapes]] = {
-    **dict.fromkeys(("Abs", "Elu", "Erf", "Exp", "Identity", "LeakyRelu", "Neg", "Relu"), _same),
-    **dict.fromkeys(("HardSigmoid", "HardSwish", "Selu", "Sigmoid", "Softplus", "Sqrt", "Tanh"), _same),
-    **dict.fromkeys(("Add", "Div", "Greater", "Max", "Min", "Mul", "Pow", "Sub", "Where"), _broadcast),
-    "Cast": _cast,
-    "Clip": _clip,
-    "Concat": _concat,
-    "Conv": _conv,
-    "Flatten": _flatten,
-    "Gemm": _gemm,
-    "LayerNormalization": _layer_norm,
-    "MatMul": _matmul,
-    "Reshape": _reshape,
-    "Split": _split,
-    "Squeeze": _squeeze,
-    "Unsqueeze": _unsqueeze,
-}  # fmt: skip
-"""Operators that are allowed, each with the shape of what comes out and what it costs."""
+        values.update(zip(node.output, map(Value, shapes), strict=True))

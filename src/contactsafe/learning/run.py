@@ -9,24 +9,19 @@ import torch
 from stable_baselines3.common.save_util import recursive_getattr
 
 from contactsafe.errors import InvalidInputError, shown
+from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, part, whole
 from contactsafe.learning.checkpoints import (
-    CheckpointError,
-    check_like,
-    check_optimiser,
     check_random_state,
     check_same_config,
-    check_tensor,
     check_unchanged,
     load_checkpoint,
     pack,
-    part,
     plain,
     random_state,
     refused_as,
     restore_random_state,
     save_checkpoint,
     unpack,
-    whole,
 )
 from contactsafe.learning.policy_config import SESSION_FIELDS
 from contactsafe.learning.replay import ReplayFile

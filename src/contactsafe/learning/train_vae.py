@@ -11,17 +11,14 @@ import torch
 from tqdm import tqdm
 
 from contactsafe.envs.rectify import WINDOW_M
+from contactsafe.learning.checking import check_like, check_optimiser, part, whole
 from contactsafe.learning.checkpoints import (
-    check_like,
-    check_optimiser,
     check_same_config,
     load_checkpoint,
-    part,
     plain,
     refused_as,
     run_folder,
     save_checkpoint,
-    whole,
     write_json,
 )
 from contactsafe.learning.datasets import make_dataset
