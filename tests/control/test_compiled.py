@@ -11,6 +11,7 @@ import tempfile
 
 import numba
 import pytest
+from numba.core import caching
 
 from contactsafe import compiled
 
@@ -227,10 +228,14 @@ def small(tmp_path, monkeypatch, folder):
 
 
 def test_a_full_disk_while_compiling_is_said_once_and_stops_nothing(tmp_path, monkeypatch, private, capsys):
+    def full(*_):
+        raise OSError(28, "No space left on device", "f.nbc")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
     for _ in range(2):
-        function = small(tmp_path, monkeypatch, "/dev/full")
+        function = small(tmp_path, monkeypatch, tmp_path)
         assert function(21) == 42
-    assert say_once(capsys)
+    assert say_once(capsys) == "f.nbc: No space left on device"
 
 
 def test_a_damaged_cache_is_compiled_anew_and_mended(tmp_path, monkeypatch, private):
