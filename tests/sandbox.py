@@ -1,8 +1,12 @@
-"""A process that cannot open a socket: the kernel ends it with SIGSYS if any code of it tries, native code too."""
+"""A process that cannot leave its machine: the kernel ends it with SIGSYS at the first socket, of native code as well.
+
+Sockets within the machine are let pass: C libraries look up the name of a user by one.
+"""
 
 import ctypes
 import platform
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -16,7 +20,7 @@ _ALLOW, _KILL = 0x7FFF0000, 0x80000000
 
 
 def forbid_sockets():
-    """End this process, and those it starts, at the first call of socket(2); see seccomp(2).
+    """End this process, and those it starts, at the first socket(2) but for AF_UNIX; see seccomp(2).
 
     Raises:
         OSError: this kernel, or this machine, cannot do that.
@@ -24,11 +28,12 @@ def forbid_sockets():
     if sys.platform != "linux" or platform.machine() not in SOCKET:
         raise OSError("no filter for this machine")
     machine, number = SOCKET[platform.machine()]
-    steps = ((_LOAD, 0, 0, 4), (_EQUAL, 0, 3, machine), (_LOAD, 0, 0, 0), (_EQUAL, 0, 1, number))
-    ends = ((_RETURN, 0, 0, _KILL), (_RETURN, 0, 0, _ALLOW))
-    program = b"".join(struct.pack("HBBI", *step) for step in (*steps, *ends))
+    is_socket = ((_LOAD, 0, 0, 4), (_EQUAL, 0, 5, machine), (_LOAD, 0, 0, 0), (_EQUAL, 0, 3, number))
+    leaves = ((_LOAD, 0, 0, 16), (_EQUAL, 1, 0, socket.AF_UNIX))  # the first argument
+    steps = (*is_socket, *leaves, (_RETURN, 0, 0, _KILL), (_RETURN, 0, 0, _ALLOW))
+    program = b"".join(struct.pack("HBBI", *step) for step in steps)
     code = ctypes.create_string_buffer(program, len(program))
-    head = ctypes.create_string_buffer(struct.pack("HxxxxxxP", len(steps + ends), ctypes.addressof(code)))
+    head = ctypes.create_string_buffer(struct.pack("HxxxxxxP", len(steps), ctypes.addressof(code)))
     libc = ctypes.CDLL(None, use_errno=True)
     for call in ((_NO_NEW_PRIVILEGES, 1, 0, 0, 0), (_SECCOMP, _FILTER, head, 0, 0)):
         if libc.prctl(*call):
