@@ -1,6 +1,6 @@
 """Damage bundles and checkpoints in every way that comes to mind, and see that each is refused in one line or harmless.
 
-    python benchmarks/fuzz.py [--bundles 1000] [--checkpoints 200] [--seed 0]
+    python benchmarks/fuzz.py [--bundles 600] [--checkpoints 150] [--seed 0]
 
 Every batch runs in a process of its own, so that a crash is seen and costs no more than its batch. Item i of a seed
 is the same in every run.
@@ -405,8 +405,8 @@ def in_batches(kind: str, seed: int, count: int):
 def main() -> int:
     """Run all, print a table and every fault; exit status 1 where there is one."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bundles", type=int, default=1000)
-    parser.add_argument("--checkpoints", type=int, default=200)
+    parser.add_argument("--bundles", type=int, default=600)
+    parser.add_argument("--checkpoints", type=int, default=150)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--run", nargs=4, help=argparse.SUPPRESS)
     asked = parser.parse_args()

@@ -331,6 +331,19 @@ def test_values_that_double_from_operator_to_operator_are_refused(bundle):
     assert told == "computes more than 16000000 numbers or 1000000000 products for one observation; export it anew"
 
 
+def test_weights_that_are_used_over_and_over_are_refused(bundle):
+    """ONNX Runtime arranges them anew for each operator when it starts."""
+
+    def change(model):
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.eye(134, 1000, dtype=np.float32), "wide"))
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.eye(1000, 1000, dtype=np.float32), "square"))
+        nodes = [onnx.helper.make_node("MatMul", ["cat", "wide"], ["m0"])]
+        nodes += [onnx.helper.make_node("MatMul", [f"m{k}", "square"], [f"m{k + 1}"]) for k in range(40)]
+        model.graph.node.extend(nodes)
+
+    assert crafted(bundle, change).startswith("computes more than 16000000 numbers or ")
+
+
 def test_rows_that_meet_other_rows_are_refused(bundle):
     """N by N numbers are no longer bounded by the rows asked for, and an action must not depend on its neighbours."""
     for kind in ("MatMul", "Gemm"):

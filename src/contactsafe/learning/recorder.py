@@ -31,7 +31,7 @@ class EventFile:
     _number = itertools.count()
 
     def __init__(self, folder, hidden_from=None):
-        name = f"events.out.tfevents.{time.time():.0f}.{socket.gethostname()}.{os.getpid()}.{next(self._number)}"
+        name = f"events.out.tfevents.{int(time.time())}.{socket.gethostname()}.{os.getpid()}.{next(self._number)}"
         self._path = Path(folder) / name
         with self._told():
             self._file = self._path.open("wb")
