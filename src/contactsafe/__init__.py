@@ -1,6 +1,7 @@
 """Contact-safe learned manipulation: a policy moves a torque-controlled arm, and every contact stays gentle."""
 
 from contactsafe import process as _process  # noqa: F401  first, for the imports below take their time; see there
+from contactsafe import telemetry as _telemetry  # noqa: F401  before any dependency is imported
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target

@@ -6,7 +6,8 @@ import signal
 import sys
 from pathlib import Path
 
-from contactsafe.learning import checkpoints
+from contactsafe import files
+from contactsafe.learning.checkpoints import CHECKPOINT
 from contactsafe.learning.train_policy import train_policy
 
 
@@ -30,15 +31,15 @@ def dying(make_env, calls):
 
 def die_while_saving(saves):
     """Have the process killed with a checkpoint half written."""
-    save, count = checkpoints.torch.save, iter(range(saves))
+    replace, count = os.replace, iter(range(saves))
 
-    def save_half(state, name):
-        save(state, name)
-        if next(count, None) is None:
+    def replace_half(name, path):
+        if Path(path).name == CHECKPOINT and next(count, None) is None:
             os.truncate(name, 1000)
             os.kill(os.getpid(), signal.SIGKILL)
+        replace(name, path)
 
-    checkpoints.torch.save = save_half
+    files.os.replace = replace_half
 
 
 def main(path):

@@ -1,6 +1,7 @@
 """Bundles: exported, sealed, run; and what a damaged one is told."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -10,6 +11,7 @@ pytestmark = pytest.mark.train
 torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 
+from benchmarks import fuzz  # noqa: E402
 from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 
 from contactsafe.envs.foveate import FEATURES  # noqa: E402
@@ -18,6 +20,7 @@ from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError,
 from contactsafe.learning.bundle import Bundle, digest  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
+from contactsafe.learning.graph import read_graph  # noqa: E402
 from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.policy import Policy  # noqa: E402
 
@@ -256,6 +259,262 @@ def test_weights_in_another_file_are_refused(bundle):
     onnx.save_model(model, bundle / "policy.onnx", save_as_external_data=True, location="weights.bin", size_threshold=0)
     reseal(bundle, "policy.onnx")
     assert refusal(bundle) == (f"{bundle}/policy.onnx keeps weights in another file; export it with the weights inside")
+
+
+def crafted(folder, change):
+    """Change the model of a policy, seal it with the right digest, and give what is said of it."""
+    model = onnx.load(folder / "policy.onnx")
+    change(model)
+    (folder / "policy.onnx").write_bytes(model.SerializeToString())
+    reseal(folder, "policy.onnx")
+    return refusal(folder).removeprefix(f"{folder}/policy.onnx ")
+
+
+def grow(kind, times=1, **attributes):
+    """Put operators between the policy's first value and its second."""
+
+    def change(model):
+        first = model.graph.node[0]
+        value, nodes = "grown", []
+        first.output[0] = value
+        for k in range(times):
+            after = "cat" if k == times - 1 else f"grown{k}"
+            nodes.append(onnx.helper.make_node(kind, [value, value], [after], **attributes))
+            value = after
+        rest = list(model.graph.node)
+        del model.graph.node[:]
+        model.graph.node.extend([rest[0], *nodes, *rest[1:]])
+
+    return change
+
+
+def add_node(kind, domain="", **attributes):
+    def change(model):
+        model.graph.node.append(onnx.helper.make_node(kind, ["state"], ["more"], domain=domain, **attributes))
+
+    return change
+
+
+def test_a_loop_of_2_to_the_62_is_refused_before_it_runs(bundle):
+    body = onnx.helper.make_graph([], "body", [], [])
+    told = crafted(bundle, add_node("Loop", body=body))
+    assert told.startswith("is not a model ONNX Runtime takes (operator 'Loop' is not one of Abs, Elu, Erf, ")
+
+
+@pytest.mark.parametrize("kind", ["If", "Scan", "ConstantOfShape", "Tile", "Expand", "Resize", "Range", "Einsum"])
+def test_operators_whose_cost_cannot_be_told_are_refused(bundle, kind):
+    assert crafted(bundle, add_node(kind)).startswith(f"is not a model ONNX Runtime takes (operator '{kind}' is not")
+
+
+@pytest.mark.parametrize("domain", ["com.microsoft", "ai.onnx.ml", "ai.onnx.training", "ai.onnx"])
+def test_operators_of_the_runtime_and_of_machine_learning_are_refused(bundle, domain):
+    assert f"(operator '{domain}.Relu' is not one of " in crafted(bundle, add_node("Relu", domain))
+
+    def declare(model):
+        model.opset_import.append(onnx.helper.make_opsetid(domain, 1))
+
+    assert "(it needs operators of [('', 18), (" in crafted(bundle, declare)
+
+
+def test_functions_that_call_each_other_2_to_the_33_times_are_refused(bundle):
+    def change(model):
+        node = onnx.helper.make_node("Relu", ["x"], ["y"])
+        opsets = [onnx.helper.make_opsetid("", 18)]
+        model.functions.append(onnx.helper.make_function("", "Relu2", ["x"], ["y"], [node], opsets))
+
+    told = crafted(bundle, change)
+    assert told == "holds more than a graph of operators (functions, subgraphs or notes); export it anew"
+
+
+def test_values_that_double_from_operator_to_operator_are_refused(bundle):
+    told = crafted(bundle, grow("Concat", 40, axis=1))
+    assert told == "computes more than 16000000 numbers or 1000000000 products for one observation; export it anew"
+
+
+def test_weights_that_are_used_over_and_over_are_refused(bundle):
+    """ONNX Runtime arranges them anew for each operator when it starts."""
+
+    def change(model):
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.eye(134, 1000, dtype=np.float32), "wide"))
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.eye(1000, 1000, dtype=np.float32), "square"))
+        nodes = [onnx.helper.make_node("MatMul", ["cat", "wide"], ["m0"])]
+        nodes += [onnx.helper.make_node("MatMul", [f"m{k}", "square"], [f"m{k + 1}"]) for k in range(40)]
+        model.graph.node.extend(nodes)
+
+    assert crafted(bundle, change).startswith("computes more than 16000000 numbers or ")
+
+
+def test_rows_that_meet_other_rows_are_refused(bundle):
+    """N by N numbers are no longer bounded by the rows asked for, and an action must not depend on its neighbours."""
+    for kind in ("MatMul", "Gemm"):
+        assert (
+            crafted(bundle, grow(kind)) == f"has an operator {kind} of a kind that nothing here exports; export it anew"
+        )
+    told = crafted(bundle, grow("Concat", axis=0))
+    assert told == "has an operator Concat of a kind that nothing here exports; export it anew"
+
+
+def test_too_many_operators_are_refused(bundle):
+    assert crafted(bundle, grow("Add", 300)) == "has 308 operators, at most 256 are allowed; export it anew"
+
+
+def test_a_convolution_that_pads_its_picture_to_2_gigabytes_is_refused(bundle):
+    model = onnx.load(bundle / "encoder.onnx")
+    conv = next(node for node in model.graph.node if node.op_type == "Conv")
+    pads = next(attribute for attribute in conv.attribute if attribute.name == "pads")
+    pads.ints[:] = [2**20] * 4
+    (bundle / "encoder.onnx").write_bytes(model.SerializeToString())
+    reseal(bundle, "encoder.onnx")
+    assert refusal(bundle).endswith("has an operator Conv of a kind that nothing here exports; export it anew")
+
+
+def test_weights_of_2_gigabytes_of_which_the_file_holds_none_are_refused(bundle):
+    def change(model):
+        model.graph.initializer[0].dims[:] = [2**20, 2**9]
+        model.graph.initializer[0].ClearField("raw_data")
+
+    assert crafted(bundle, change).startswith("has weights 'layers.0.weight' of shape (1048576, 512) without as many")
+
+
+def test_nan_weights_are_refused(bundle):
+    def change(model):
+        bias = model.graph.initializer[1]
+        bias.raw_data = np.full(16, np.nan, np.float32).tobytes()
+
+    assert crafted(bundle, change) == "has weights 'layers.0.bias' that are not finite; export it anew"
+
+
+def test_weights_given_out_as_an_action_are_refused(bundle):
+    def change(model):
+        del model.graph.node[:]
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.zeros(18, np.float32), "action"))
+
+    assert (
+        crafted(bundle, change) == "has an output 'action' of shape [None, 18] that it does not compute; export it anew"
+    )
+
+
+def test_a_value_used_before_it_is_computed_is_refused(bundle):
+    def turn(model):
+        nodes = list(model.graph.node)[::-1]
+        del model.graph.node[:]
+        model.graph.node.extend(nodes)
+
+    assert "before it is computed" in crafted(bundle, turn)
+
+
+def test_a_model_of_the_runtimes_own_format_is_refused(bundle):
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.optimized_model_filepath = str(bundle / "policy.ort")
+    options.log_severity_level = 4
+    options.add_session_config_entry("session.save_model_format", "ORT")
+    onnxruntime.InferenceSession(bundle / "policy.onnx", options, providers=["CPUExecutionProvider"])
+    (bundle / "policy.ort").rename(bundle / "policy.onnx")
+    reseal(bundle, "policy.onnx")
+    assert refusal(bundle).startswith(f"{bundle}/policy.onnx is not a model ONNX Runtime takes (it cannot be read as")
+
+
+def test_what_onnx_runtime_gets_is_what_was_read(bundle):
+    """Notes, shape hints and the like are not handed on."""
+    data = (bundle / "policy.onnx").read_bytes()
+    model = read_graph(data, "policy").model
+    names = {field.name for field, _ in onnx.load_from_string(model).graph.ListFields()}
+    assert names == {"node", "name", "initializer", "doc_string", "input", "output"}
+    onnx.checker.check_model(onnx.load_from_string(model))
+    assert read_graph(model, "policy").model == model
+
+
+@pytest.mark.parametrize("name", ["bundle.json", "policy.onnx"])
+def test_symbolic_links_out_of_the_folder_are_refused(bundle, tmp_path, name):
+    outside = tmp_path / "outside"
+    (bundle / name).rename(outside)
+    (bundle / name).symlink_to(outside)
+    assert refusal(bundle) == f"{bundle}/{name} is a link to another folder; copy the file itself"
+
+
+def test_a_link_within_the_folder_and_one_to_the_folder_are_followed(bundle, tmp_path):
+    (bundle / "policy.onnx").rename(bundle / "policy-1.onnx")
+    (bundle / "policy.onnx").symlink_to("policy-1.onnx")
+    (tmp_path / "latest").symlink_to(bundle)
+    assert Bundle.load(tmp_path / "latest").rate_hz == 60.0
+
+
+def test_a_pipe_a_folder_or_a_device_in_place_of_a_file_is_refused_at_once(bundle):
+    path = bundle / "policy.onnx"
+    path.unlink()
+    os.mkfifo(path)
+    assert refusal(bundle) == f"{path} is not a file; copy or export the bundle anew"
+    path.unlink()
+    path.mkdir()
+    assert refusal(bundle) == f"{path} is not a file; copy or export the bundle anew"
+    path.rmdir()
+    path.symlink_to("/dev/zero")
+    assert refusal(bundle) == f"{path} is a link to another folder; copy the file itself"
+    path.unlink()
+    path.symlink_to(path)
+    assert refusal(bundle).startswith(f"{path} cannot be read: ")
+
+
+def test_an_unreadable_file_is_told_in_one_line(bundle, monkeypatch):
+    monkeypatch.setattr(os, "open", lambda *_: (_ for _ in ()).throw(PermissionError(13, "Permission denied")))
+    assert refusal(bundle) == f"{bundle}/bundle.json cannot be read: Permission denied; check who may read it"
+
+
+WILD = ("9" * 900_000, [0] * 100_000, {"x" * 100_000: 1}, 10**4000, [[["x"] * 9] * 9] * 9)
+
+
+@pytest.mark.parametrize("value", WILD, ids=["text", "list", "object", "number", "nested"])
+def test_a_field_of_900_000_digits_is_shown_short(bundle, value):
+    whole = json.loads((bundle / "bundle.json").read_text())
+    for field in ("format", "representation", "observes", "view_size", "window_m", "scan"):
+        rewrite(bundle, **{**whole, field: value})
+        assert len(refusal(bundle).replace(str(bundle), "")) < 250
+
+
+def test_a_number_of_900_000_digits_is_no_json(bundle):
+    text = (bundle / "bundle.json").read_text().replace("0.64", "9" * 900_000)
+    (bundle / "bundle.json").write_text(text)
+    assert refusal(bundle) == f"{bundle}/bundle.json is not JSON; the bundle is damaged, copy or export it anew"
+
+
+def test_a_name_that_stands_twice_in_the_manifest_is_refused(bundle):
+    text = (bundle / "bundle.json").read_text()
+    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 3,', 1))
+    assert refusal(bundle) == (
+        f"{bundle}/bundle.json says 'format' twice; the bundle is damaged, copy or export it anew"
+    )
+
+
+def test_numbers_of_a_foveated_picture_that_cannot_be_are_refused(tmp_path):
+    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
+    rewrite(folder, latent_size=5)
+    assert refusal(folder).endswith(f"latent_size = 5 is outside [{FEATURES}, {FEATURES}]; export the bundle anew")
+
+
+def test_what_the_exporter_makes_of_usual_networks_is_allowed():
+    _, _, scaling = networks()
+    nn = torch.nn
+    usual = nn.LayerNorm(8), nn.ReLU(), nn.ELU(), nn.SiLU(), nn.GELU(), nn.Softplus(), nn.LeakyReLU(), nn.Sigmoid()
+    layers = nn.Sequential(nn.Linear(134, 8), *usual, nn.Linear(8, 18), nn.Tanh())
+    examples = [torch.zeros(2, 6), torch.zeros(2, 128)]
+    module = DeployedPolicy(layers, scaling)
+    compare(module, to_onnx(module, examples, ["state", "latent"], "action"), "policy", examples, ["state", "latent"])
+
+
+def test_damage_of_every_kind_is_refused_or_harmless():
+    """A slice of `benchmarks/fuzz.py`, which has the long campaign."""
+    results = list(fuzz.bundles(1, range(60)))
+    assert [result for result in results if result[2] not in ("refused", "harmless")] == []
+    assert sum(outcome == "refused" for *_, outcome in results) > 20
+
+
+def test_what_somebody_put_beside_a_bundle_stays_when_it_is_written_anew(bundle):
+    _, layers, scaling = networks()
+    (bundle / "notes.txt").write_text("years of work")
+    export_bundle(bundle, (bundle / "encoder.onnx").read_bytes(), layers, scaling, DESCRIPTION, force=True)
+    assert (bundle / "notes.txt").read_text() == "years of work"
 
 
 def test_exported_models_carry_no_paths(exported):

@@ -25,7 +25,7 @@ from contactsafe.cli import main  # noqa: E402
 from contactsafe.envs.config import WipingConfig  # noqa: E402
 from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, unpack  # noqa: E402
+from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, save_checkpoint, unpack  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
@@ -273,7 +273,7 @@ def test_what_cannot_be_resumed(vae, tmp_path):
         f"the encoder in {other} is not the one that the run in {config.out} was started with; "
         "give that one's folder as --vae, or start anew with another --out"
     )
-    torch.save({"policy": {}}, config.out / "checkpoint.pt")
+    save_checkpoint(config.out, {"policy": {}})
     with pytest.raises(InvalidInputError) as error:
         train_policy(dataclasses.replace(config, resume=True), FakeWiping)
     assert str(error.value) == f"{config.out} holds a run of another version; start anew with another --out"

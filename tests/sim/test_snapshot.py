@@ -119,3 +119,37 @@ def test_a_snapshot_of_something_else_is_refused(course):
     with pytest.raises(InvalidInputError) as error:
         worlds.restore({**snapshot, "cells": snapshot["cells"][:, :3]})
     assert str(error.value) == "the snapshot holds an array (2, 3, 300) for one of (2, 250, 300); start anew"
+
+
+@pytest.mark.parametrize(
+    ("part", "field", "value"),
+    [
+        ("plants", "push_body", 10**9),
+        ("plants", "camera", -1),
+        ("plants", "tcp_site", 10**9),
+        ("controllers", "state.search_at", 10**9),
+        ("controllers", "state.turn", 7),
+        ("controllers", "handle.skin_points", 10**9),
+        ("controllers", "state.tau", np.nan),
+    ],
+)
+def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, part, field, value):
+    worlds, snapshot, _, _, _ = course
+    spoiled = {**snapshot, part: {name: array.copy() for name, array in snapshot[part].items()}}
+    spoiled["cells"] = np.zeros_like(snapshot["cells"])
+    spoiled[part][field].reshape(-1)[-1] = value
+    before = worlds.snapshot()
+    with pytest.raises(InvalidInputError, match=r"^the snapshot holds .* start anew$") as error:
+        worlds.restore(spoiled)
+    assert f"({part}.{field})" in str(error.value)
+    after = worlds.snapshot()
+    assert_array_equal(after["cells"], before["cells"])
+    assert_array_equal(after["plants"]["tick"], before["plants"]["tick"])
+
+
+def test_a_random_generator_whose_state_is_an_index_is_refused(course):
+    worlds, snapshot, _, _, _ = course
+    twister = {"bit_generator": "MT19937", "state": {"key": [0] * 624, "pos": 10**9}}
+    for state in (twister, {"bit_generator": "seed"}, {}, {**snapshot["noise"][0], "state": {"state": ["x"]}}):
+        with pytest.raises(InvalidInputError, match="which is not the state of a random generator"):
+            worlds.restore({**snapshot, "noise": [state, state]})

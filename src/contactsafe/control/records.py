@@ -220,6 +220,20 @@ def controller_dtype(n: int) -> np.dtype:
     )
 
 
+def index_bounds(controller) -> dict[str, tuple[float, float]]:
+    """Give what those integers of a `controller_dtype` record may be that compiled code uses as an index, by name."""
+    n, points = len(controller["state"]["tau"]), int(controller["handle"]["skin_points"])
+    return {
+        "state.turn": (0, n - 1),
+        "state.mode": (FREE, CONTACT),
+        "state.contact_link": (0, n),
+        "state.search_at": (0, max(points - 1, 0)),
+        "state.search_point": (-1, points - 1),
+        "output.mode": (FREE, CONTACT),
+        "output.link": (0, n),
+    }
+
+
 def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     """Resolve a configuration for an arm into a `params_dtype` record."""
     dt = config.dt

@@ -150,7 +150,7 @@ class WipingTasks:
         parts = {} if self._variation is None else {"variation": of_object(self._variation)}
         if self._pusher is not None:
             parts["pushes"] = of_generators(self._pusher.rngs)
-        return {**parts, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks)}
+        return {**parts, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks, {"light": (0, 2**31)})}
 
     def snapshot(self) -> dict[str, Any]:
         """Take all that decides the tasks' future, as plain values and arrays."""

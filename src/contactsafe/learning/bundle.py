@@ -1,12 +1,14 @@
 """A policy as it is shipped: a folder with its ONNX models and a page of JSON that describes and seals them.
 
-Nothing here unpickles or runs what it reads: files are bounded in size, compared with their SHA-256, and handed to ONNX
-Runtime as bytes. The digests guard against damage and mix-ups; they are no signature.
+Nothing here unpickles or runs what it reads: files are bounded in size, compared with their SHA-256, read whole and
+checked (`learning.graph`), and handed to ONNX Runtime as bytes. The digests guard against damage and mix-ups; they are
+no signature.
 """
 
 import hashlib
 import json
-import math
+import os
+import stat
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -14,9 +16,11 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
+from contactsafe.envs.foveate import FEATURES
 from contactsafe.envs.tasks import OBSERVED
-from contactsafe.errors import BundleError, InvalidInputError
-from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
+from contactsafe.errors import BundleError, InvalidInputError, shown
+from contactsafe.learning.graph import check_ports, read_graph
+from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, encoder_ports, open_session
 from contactsafe.learning.scan import Scan
 
 FORMAT = 3
@@ -31,6 +35,14 @@ MAX_MANIFEST_BYTES = 1_000_000
 MAX_MODEL_BYTES = 16_000_000
 
 MAX_LATENT = 4096
+
+BOUNDS = {
+    "window_m": (0.01, 10.0),
+    "view_size": (8, 1024),
+    "rate_hz": (0.1, 1000.0),
+    "action_repeat": (1, 100),
+}
+"""Numbers of bundle.json and what they may be."""
 
 ACTIONS = tuple(
     f"{group}_{axis}"
@@ -99,23 +111,25 @@ class Bundle:
             The Bundle; every check below has passed.
 
         Raises:
-            BundleError: a file is missing, too large, damaged or not what bundle.json says; the format is another; a
-                model has other inputs and outputs, keeps weights outside its file or needs operators beyond ONNX's own.
+            BundleError: a file is missing, too large, unreadable, a link to elsewhere, damaged or not what bundle.json
+                says; the format is another; a model has other inputs and outputs, or more than `learning.graph` allows.
         """
         folder = Path(folder)
-        if not (folder / MANIFEST).is_file():
-            raise BundleError(_what_is_there(folder))
+        try:
+            missing = None if (folder / MANIFEST).exists() else _what_is_there(folder)
+        except OSError as error:
+            raise BundleError(f"{folder} cannot be read: {error.strerror}; check who may read it") from None
+        if missing:
+            raise BundleError(missing)
         manifest = _read_manifest(folder)
-        latent = ("float", [manifest["latent_size"]])
         encoder = None
         if manifest["representation"] in LEARNED:
-            encoder = _read_model(folder, ENCODER, manifest["files"])
-            size = manifest["view_size"]
-            _check_ports(folder / ENCODER, encoder, {"mask": ("uint8", [size, size])}, {"latent": latent})
-        policy = _read_model(folder, POLICY, manifest["files"])
+            ports = encoder_ports(manifest["view_size"], manifest["latent_size"])
+            encoder = _read_model(folder, ENCODER, manifest["files"], *ports)
         state = ("float", [sum(OBSERVED[name] for name in manifest["observes"])])
-        inputs = {"state": state, "latent": latent}
-        _check_ports(folder / POLICY, policy, inputs, {"action": ("float", [len(ACTIONS)])})
+        latent = ("float", [manifest["latent_size"]])
+        ports = {"state": state, "latent": latent}, {"action": ("float", [len(ACTIONS)])}
+        policy = _read_model(folder, POLICY, manifest["files"], *ports)
         return cls(folder, manifest, encoder, policy)
 
     @property
@@ -151,83 +165,107 @@ def _what_is_there(folder):
     return f"{folder / MANIFEST} is missing; the bundle is incomplete, copy or export it anew"
 
 
-def _read_bounded(path, limit):
-    if not path.is_file():
-        raise BundleError(f"{path} is missing; the bundle is incomplete, copy or export it anew")
-    size = path.stat().st_size
-    if size > limit:
-        raise BundleError(f"{path} has {size} bytes, at most {limit} are allowed; this is not a bundle of ours")
-    return path.read_bytes()
+def read_bounded(folder, name, limit):
+    """Read a file that lies in a folder (a Path), of at most so many bytes.
+
+    Raises:
+        BundleError: it is missing, too large, no file, a link out of the folder, or cannot be read.
+    """
+    path = folder / name
+    try:
+        real = path.resolve(strict=True)
+        if real.parent != folder.resolve():
+            raise BundleError(f"{path} is a link to another folder; copy the file itself")
+        # Not to wait at a pipe, nor to be led elsewhere since.
+        handle = os.open(real, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            found = os.fstat(handle)
+            if not stat.S_ISREG(found.st_mode):
+                raise BundleError(f"{path} is not a file; copy or export the bundle anew")
+            if found.st_size > limit:
+                raise BundleError(
+                    f"{path} has {found.st_size} bytes, at most {limit} are allowed; this is not a bundle of ours"
+                )
+            with open(handle, "rb", closefd=False) as file:
+                return file.read(limit)
+        finally:
+            os.close(handle)
+    except FileNotFoundError:
+        raise BundleError(f"{path} is missing; the bundle is incomplete, copy or export it anew") from None
+    except (OSError, RuntimeError) as error:  # a RuntimeError is a circle of links
+        reason = getattr(error, "strerror", None) or error
+        raise BundleError(f"{path} cannot be read: {reason}; check who may read it") from None
 
 
 def _read_manifest(folder):
     path = folder / MANIFEST
     try:
-        manifest = json.loads(_read_bounded(path, MAX_MANIFEST_BYTES))
+        manifest = json.loads(read_bounded(folder, MANIFEST, MAX_MANIFEST_BYTES), object_pairs_hook=_once)
+    except _TwiceError as twice:
+        raise BundleError(
+            f"{path} says {shown(str(twice))} twice; the bundle is damaged, copy or export it anew"
+        ) from None
     except (ValueError, RecursionError) as error:
         raise BundleError(f"{path} is not JSON; the bundle is damaged, copy or export it anew") from error
     if not isinstance(manifest, dict):
         raise BundleError(f"{path} is not a JSON object; the bundle is damaged, copy or export it anew")
     version = manifest.get("format")
     if version != FORMAT:
-        raise BundleError(f"{path} has format {version!r}, this version reads {FORMAT}; export it anew, or upgrade")
+        raise BundleError(
+            f"{path} has format {shown(version)}, this version reads {FORMAT}; export it anew, or upgrade"
+        )
     for name, kind in FIELDS.items():
         value = manifest.get(name)
         fits = isinstance(value, (int, float) if kind is float else kind) and not isinstance(value, bool)
         if not fits:
-            raise BundleError(f"{path}: {name} is {value!r}, not {kind.__name__}; export the bundle anew")
+            raise BundleError(f"{path}: {name} is {shown(value)}, not {kind.__name__}; export the bundle anew")
     if manifest["representation"] not in REPRESENTATIONS:
         allowed = ", ".join(REPRESENTATIONS)
-        raise BundleError(f"{path}: representation is {manifest['representation']!r}, not one of {allowed}")
+        raise BundleError(f"{path}: representation is {shown(manifest['representation'])}, not one of {allowed}")
     try:
         Scan(**manifest["scan"])
     except (TypeError, InvalidInputError) as error:
-        raise BundleError(f"{path}: scan is {manifest['scan']!r}; export the bundle anew") from error
+        raise BundleError(f"{path}: scan is {shown(manifest['scan'])}; export the bundle anew") from error
     observes = manifest["observes"]
     if not all(isinstance(name, str) and name in OBSERVED for name in observes) or len(set(observes)) < len(observes):
-        raise BundleError(f"{path}: observes is {observes!r}, not some of {', '.join(OBSERVED)}; export it anew")
+        raise BundleError(f"{path}: observes is {shown(observes)}, not some of {', '.join(OBSERVED)}; export it anew")
     if manifest["actions"] != list(ACTIONS):
         raise BundleError(f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade")
-    for name, low, high in (
-        ("window_m", 0.01, 10.0),
-        ("view_size", 8, 1024),
-        ("latent_size", 1, MAX_LATENT),
-        ("rate_hz", 0.1, 1000.0),
-        ("action_repeat", 1, 100),
-    ):
-        if not (math.isfinite(manifest[name]) and low <= manifest[name] <= high):
-            raise BundleError(f"{path}: {name} = {manifest[name]} is outside [{low}, {high}]; export the bundle anew")
+    latent = (1, MAX_LATENT) if manifest["representation"] in LEARNED else (FEATURES, FEATURES)
+    for name, (low, high) in {**BOUNDS, "latent_size": latent}.items():
+        if not low <= manifest[name] <= high:
+            raise BundleError(
+                f"{path}: {name} = {shown(manifest[name])} is outside [{low}, {high}]; export the bundle anew"
+            )
     return manifest
 
 
-def _read_model(folder, name, files):
+class _TwiceError(ValueError):
+    """A name that stands twice in one object."""
+
+
+def _once(pairs):
+    found = {}
+    for name, value in pairs:
+        if name in found:
+            raise _TwiceError(name)
+        found[name] = value
+    return found
+
+
+def _read_model(folder, name, files, inputs, outputs):
+    """Read one of the models, and start it once it is known to be what bundle.json says and to have these ports."""
     path = folder / name
-    data = _read_bounded(path, MAX_MODEL_BYTES)
+    data = read_bounded(folder, name, MAX_MODEL_BYTES)
     entry = files.get(name)
     if not isinstance(entry, dict) or entry.get("bytes") != len(data) or entry.get("sha256") != digest(data):
         raise BundleError(
             f"{path} is not the file {MANIFEST} was written for (size or SHA-256 differ); "
             "copy or export the bundle anew"
         )
-    if b"location" in data:
-        # The key under which ONNX names a file that holds weights. What we export has no such word anywhere.
-        raise BundleError(f"{path} keeps weights in another file; export it with the weights inside")
-    return open_session(data, str(path))
-
-
-def _check_ports(path, session, inputs, outputs):
-    for side, wanted, found in (("input", inputs, session.get_inputs()), ("output", outputs, session.get_outputs())):
-        have = {port.name: (port.type, port.shape) for port in found}
-        for name, (kind, tail) in wanted.items():
-            if name not in have or have[name][0] != f"tensor({kind})" or list(have[name][1][1:]) != tail:
-                raise BundleError(
-                    f"{path}: {side} {name} is {have.get(name, 'absent')}, not tensor({kind}) of shape (N, "
-                    f"{', '.join(map(str, tail))}); export the bundle anew"
-                )
-            if isinstance(have[name][1][0], int):
-                raise BundleError(f"{path}: {side} {name} has a fixed batch size; export it with a free one")
-        if len(have) != len(wanted):
-            raise BundleError(f"{path}: {side}s are {sorted(have)}, not {sorted(wanted)}; export the bundle anew")
+    graph = read_graph(data, str(path))
+    check_ports(graph, str(path), inputs, outputs)
+    return open_session(graph, str(path))
 
 
 def blank_observation(manifest, n=1):

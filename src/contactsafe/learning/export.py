@@ -16,8 +16,9 @@ from torch import nn
 
 from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, ContactSafeError, OutputError
+from contactsafe.files import cannot_write, write_whole
 from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
-from contactsafe.learning.checkpoints import write_atomically, write_json
+from contactsafe.learning.checkpoints import write_json
 from contactsafe.learning.encoder import MaskEncoder
 from contactsafe.learning.perception import open_session
 
@@ -90,7 +91,9 @@ def to_onnx(module, examples, inputs, output):
         )
         model = onnx.load(path)
     # Stack traces and local paths are noted in there; they are nobody's business.
-    for entry in (model, model.graph, *model.graph.node, *model.graph.initializer, *model.graph.value_info):
+    graph = model.graph
+    ports = (*graph.input, *graph.output, *graph.value_info)
+    for entry in (model, graph, *graph.node, *graph.initializer, *ports):
         if hasattr(entry, "metadata_props"):
             del entry.metadata_props[:]
         entry.doc_string = ""
@@ -131,7 +134,7 @@ def export_encoder(vae, path, size):
     examples = (255 * (torch.rand((5, size, size), generator=generator) > 0.02)).to(torch.uint8)
     data = to_onnx(encoder, [examples[:2]], ["mask"], "latent")
     compare(encoder, data, str(path), [examples], ["mask"])
-    write_atomically(path, lambda name: Path(name).write_bytes(data))
+    write_whole(Path(path), data)
 
 
 def export_bundle(folder, encoder, layers, scaling, description, force=False):
@@ -178,14 +181,16 @@ def export_bundle(folder, encoder, layers, scaling, description, force=False):
         folder.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     except OSError as error:
-        raise OutputError(f"cannot write {folder}: {error.strerror}; choose a folder you may write to") from error
+        raise cannot_write(folder, error) from None
     try:
         staged.chmod(0o755)
         for name, data in models.items():
-            (staged / name).write_bytes(data)
+            write_whole(staged / name, data)
         write_json(staged / MANIFEST, manifest)
         Bundle.load(staged)
         _put_in_place(staged, folder)
+    except OutputError as error:
+        raise OutputError(f"{error}; nothing was changed") from None
     except (OSError, BundleError) as error:
         raise OutputError(f"cannot write {folder}: {error}; nothing was changed") from error
     finally:
@@ -194,13 +199,19 @@ def export_bundle(folder, encoder, layers, scaling, description, force=False):
 
 
 def _put_in_place(staged, folder):
-    """Rename; a folder that was there is moved aside first and brought back if that fails."""
+    """Rename; a folder that was there is moved aside first and brought back if that fails.
+
+    What somebody else has put into it comes along.
+    """
     if not folder.exists():
         os.rename(staged, folder)
         return
     aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.old.", dir=folder.parent))
     os.rename(folder, aside / "old")
     try:
+        for path in (aside / "old").iterdir():
+            if path.name not in (MANIFEST, ENCODER, POLICY):
+                (shutil.copytree if path.is_dir() else shutil.copy2)(path, staged / path.name)
         os.rename(staged, folder)
     except OSError:
         os.rename(aside / "old", folder)

@@ -8,6 +8,7 @@ import onnxruntime
 from contactsafe.envs.foveate import FEATURES, SHARES, foveate, ground_of
 from contactsafe.envs.rectify import rectify
 from contactsafe.errors import BundleError, InvalidInputError
+from contactsafe.learning.graph import Graph, read_graph
 
 LEARNED = ("tool", "paper")
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
@@ -19,27 +20,34 @@ REPRESENTATIONS = ("foveated", *LEARNED)
 
 
 def open_session(model, name, threads=1):
-    """Start ONNX Runtime on a model held in memory.
+    """Start ONNX Runtime on a model held in memory, once it has been checked.
 
     Args:
-        model: the file's bytes.
+        model: the file's bytes, or a Graph that was read from them.
         name: what to call it in errors.
         threads: for one operator; 1 keeps clear of the control loop's core.
 
     Raises:
-        BundleError: the bytes are no ONNX model, or need operators that are not ONNX's own.
+        BundleError: the bytes are no ONNX model, or one with more than `learning.graph` allows.
     """
+    graph = model if isinstance(model, Graph) else read_graph(model, name)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = 4
     # Threads that spin between calls would eat the core the controller runs on.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_session_config_entry("session.load_model_format", "ONNX")
     try:
-        return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(graph.model, options, providers=["CPUExecutionProvider"])
     except Exception as error:
         reason = str(error).splitlines()[0][:160]
         raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
+
+
+def encoder_ports(size, latent_size):
+    """Give inputs and outputs of an encoder of pictures of so many pixels along a side, as `graph.check_ports` does."""
+    return {"mask": ("uint8", [size, size])}, {"latent": ("float", [latent_size])}
 
 
 class Perception:

@@ -8,13 +8,29 @@ import torch
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
-from contactsafe.errors import InvalidInputError
-from contactsafe.learning.bundle import FOLDER, digest
-from contactsafe.learning.checkpoints import CHECKPOINT, plain, prepare_folder, write_json
+from contactsafe.errors import BundleError, InvalidInputError, shown
+from contactsafe.learning.bundle import (
+    ENCODER,
+    FOLDER,
+    MAX_LATENT,
+    MAX_MANIFEST_BYTES,
+    MAX_MODEL_BYTES,
+    digest,
+    read_bounded,
+)
+from contactsafe.learning.checkpoints import CHECKPOINT, plain, run_folder, write_json
 from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.learning.export import export_bundle
+from contactsafe.learning.graph import check_ports, read_graph
 from contactsafe.learning.observation import ObservationScaling
-from contactsafe.learning.perception import EYES_FORMAT, LEARNED, Perception, open_session
+from contactsafe.learning.perception import (
+    EYES_FORMAT,
+    LEARNED,
+    REPRESENTATIONS,
+    Perception,
+    encoder_ports,
+    open_session,
+)
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.recorder import Curves, Recorder
 from contactsafe.learning.run import Run, load_run
@@ -41,10 +57,13 @@ def train_policy(config, make_env=None, make_held_out=None):
         OutputError: out cannot be written, or holds another run.
     """
     eyes = _Eyes.load(config.vae)
-    out = prepare_folder(config.out, config.resume)
-    state = load_run(config, eyes.digest) if config.resume else None
-    write_json(out / "config.json", plain(config))
     make_env = make_env or (lambda num_envs: gymnasium.make_vec(config.env_id, num_envs=num_envs))
+    with run_folder(config.out, config.resume) as out:
+        return _train(config, eyes, make_env, make_held_out or make_env, out)
+
+
+def _train(config, eyes, make_env, make_held_out, out):
+    state = load_run(config, eyes.digest) if config.resume else None
     torch.set_num_threads(config.threads)
     env = _encoded(make_env(config.num_envs), eyes, config)
     try:
@@ -54,7 +73,7 @@ def train_policy(config, make_env=None, make_held_out=None):
     layers, description = config.actor(model), _describe(config, eyes, effort)
     folder = export_bundle(out / FOLDER, eyes.encoder, layers, env.scaling, description, force=True)
     if config.evaluate_episodes:
-        description["results"] = _evaluate(folder, make_held_out or make_env, config)
+        description["results"] = _evaluate(folder, make_held_out, config)
         export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
     return description["results"]
 
@@ -70,11 +89,12 @@ class _Eyes:
     @classmethod
     def load(cls, folder):
         try:
-            text = (folder / "vae.json").read_bytes()
+            text = read_bounded(folder, "vae.json", MAX_MANIFEST_BYTES)
             vae = json.loads(text)
-            encoder = (folder / "encoder.onnx").read_bytes() if vae["representation"] in LEARNED else None
+            learned = vae["representation"] in LEARNED
+            encoder = read_bounded(folder, ENCODER, MAX_MODEL_BYTES) if learned else None
             version = vae["format"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (BundleError, ValueError, KeyError, TypeError, RecursionError) as error:
             remedy = f"run `contactsafe train vae --out {folder}` first"
             if (folder / CHECKPOINT).exists():
                 remedy = "it is a run; give the folder in which `contactsafe train vae` has come to its end"
@@ -83,17 +103,38 @@ class _Eyes:
             ) from error
         if version != EYES_FORMAT:
             raise InvalidInputError(
-                f"{folder / 'vae.json'} has format {version!r}, this version reads {EYES_FORMAT}; "
+                f"{folder / 'vae.json'} has format {shown(version)}, this version reads {EYES_FORMAT}; "
                 f"run `contactsafe train vae --out {folder}` anew"
             )
+        if not _are_eyes(vae):
+            raise InvalidInputError(
+                f"{folder / 'vae.json'} holds numbers that cannot be; run `contactsafe train vae --out {folder}` anew"
+            )
         return cls(encoder, vae, digest((encoder or b"") + text))
+
+
+def _are_eyes(vae):
+    """Tell whether what vae.json says can be used as it is."""
+    statistics = vae.get("latent_mean"), vae.get("latent_std")
+    return (
+        vae["representation"] in REPRESENTATIONS
+        and all(isinstance(vae.get(name), int | float) for name in ("size", "window_m"))
+        and isinstance(vae["size"], int)
+        and all(low <= vae[name] <= high for name, (low, high) in (("size", (8, 1024)), ("window_m", (0.01, 10.0))))
+        and all(isinstance(numbers, list) and 1 <= len(numbers) <= MAX_LATENT for numbers in statistics)
+        and len(statistics[0]) == len(statistics[1])
+        and all(isinstance(number, int | float) and abs(number) < 1e6 for number in statistics[0] + statistics[1])
+    )
 
 
 def _encoded(raw_env, eyes, config):
     vae = eyes.vae
     session = None
     if eyes.encoder is not None:
-        session = open_session(eyes.encoder, str(config.vae / "encoder.onnx"), config.encoder_threads)
+        name = str(config.vae / ENCODER)
+        graph = read_graph(eyes.encoder, name)
+        check_ports(graph, name, *encoder_ports(vae["size"], len(vae["latent_mean"])))
+        session = open_session(graph, name, config.encoder_threads)
     view = (vae["representation"], vae["window_m"], vae["size"])
     perception = Perception(session, *view, _homography(raw_env), share=True)
     scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
@@ -110,6 +151,7 @@ def _learn(config, env, eyes, state):
     model = config.make_model(env)
     run = Run(config, model, env, eyes.digest)
     recorder = Recorder(run, 0.0 if state is None else run.restore(state))
+    write_json(config.out / "config.json", plain(config))
     # Stable-Baselines3 adds these to the steps done: its total, which the learning rate falls by, stays total_steps.
     remaining = config.total_steps - model.num_timesteps
     if remaining > 0:

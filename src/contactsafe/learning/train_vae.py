@@ -1,5 +1,6 @@
 """Prepare the policy's eyes: train the β-VAE on masks from the simulator, or set up those that need no training."""
 
+import contextlib
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,15 +8,16 @@ from typing import Literal
 
 import numpy as np
 import torch
-from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
 from contactsafe.envs.rectify import WINDOW_M
+from contactsafe.learning.checking import check_like, check_optimiser, part, whole
 from contactsafe.learning.checkpoints import (
     check_same_config,
     load_checkpoint,
     plain,
-    prepare_folder,
+    refused_as,
+    run_folder,
     save_checkpoint,
     write_json,
 )
@@ -24,6 +26,10 @@ from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
 from contactsafe.learning.perception import EYES_FORMAT, Perception
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
+from contactsafe.learning.recorder import EventFile
+
+_MAY_DIFFER = ("out", "resume", "threads", "held_out", "probe_steps")
+"""Settings that may change when a run goes on."""
 
 HELD_OUT_SEED = 1_000_003
 """Added to the seed for pictures that are never trained on."""
@@ -86,7 +92,11 @@ def train_vae(config, sample_masks, homography):
         OutputError: out cannot be written, or holds another run.
         InvalidInputError: nothing to resume, or settings differ from those the run was started with.
     """
-    out = prepare_folder(config.out, config.resume)
+    with run_folder(config.out, config.resume) as out:
+        return _train(config, sample_masks, homography, out)
+
+
+def _train(config, sample_masks, homography, out):
     if config.representation == "foveated":
         report = _report_foveated(config, sample_masks, homography)
         write_json(out / "vae.json", report)
@@ -98,23 +108,26 @@ def train_vae(config, sample_masks, homography):
     first_epoch = 0
     if config.resume:
         state = load_checkpoint(out)
-        check_same_config(state["config"], config, may_differ=("out", "resume", "threads", "held_out", "probe_steps"))
+        with refused_as(out):
+            check_same_config(part(state, "config", dict), config, may_differ=_MAY_DIFFER)
+            check_like(part(state, "model", dict), dict(vae.state_dict()), "model")
+            check_optimiser(part(state, "optimiser", dict), optimiser, "optimiser")
+            first_epoch = whole(state, "epochs_done")
         vae.load_state_dict(state["model"])
         optimiser.load_state_dict(state["optimiser"])
-        first_epoch = state["epochs_done"]
 
     view = (config.representation, config.window_m, config.encoder.size)
     data = make_dataset(sample_masks, homography, config.images, config.seed, *view)
     held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_SEED, *view)
 
-    with SummaryWriter(str(out)) as log:
+    with contextlib.closing(EventFile(out)) as log:
         for epoch in range(first_epoch, config.epochs):
-            for name, value in _train_epoch(vae, optimiser, data, epoch, config).items():
-                log.add_scalar(f"train/{name}", value, epoch)
+            losses = _train_epoch(vae, optimiser, data, epoch, config)
+            log.write({f"train/{name}": value for name, value in losses.items()}, epoch)
             state = {"model": vae.state_dict(), "optimiser": optimiser.state_dict()}
             save_checkpoint(out, {**state, "epochs_done": epoch + 1, "config": plain(config)})
-            for name, value in reconstruction_report(vae, held_out)["all"].items():
-                log.add_scalar(f"held_out/{name}", value, epoch)
+            report = reconstruction_report(vae, held_out)["all"]
+            log.write({f"held_out/{name}": value for name, value in report.items()}, epoch)
 
     report = _report(vae, data, held_out, config)
     export_encoder(vae, out / "encoder.onnx", report["size"])

@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.errors import InvalidInputError, shown
 from contactsafe.learning.evaluation import step_values
 from contactsafe.learning.scan import Scan
-from contactsafe.sim.snapshot import Part, of_array, of_object, put, take
+from contactsafe.sim.snapshot import Part, check, of_array, of_object, put, take
 
 _STILL = Scan(amplitude=0.0)
 
@@ -138,9 +138,11 @@ class EncodedVecEnv(VecEnv):
         """List what decides the future, but for the observation that was given last."""
         worlds = {"worlds": of_object(self.env.unwrapped)} if self.keeps_worlds else {}
         return worlds | {
-            "steps": of_array(self._steps),
-            "tally": Part(lambda: {key: value.copy() for key, value in self._tally.items()}, self._set_tally),
-            "finished": Part(lambda: list(self.finished), self._set_finished),
+            "steps": of_array(self._steps, 0, 2**53),
+            "tally": Part(
+                lambda: {key: value.copy() for key, value in self._tally.items()}, self._set_tally, self._check_tally
+            ),
+            "finished": Part(lambda: list(self.finished), self._set_finished, _check_finished),
         }
 
     def snapshot(self):
@@ -154,6 +156,18 @@ class EncodedVecEnv(VecEnv):
 
     def _set_tally(self, tally):
         self._tally = {key: value.copy() for key, value in tally.items()}
+
+    def _check_tally(self, tally):
+        sums = {name: of_array(np.zeros(self.num_envs, np.asarray(value).dtype)) for name, value in dict(tally).items()}
+        check(sums, tally)
+
+    def check(self, snapshot):
+        """Refuse a snapshot that `restore` could not put back.
+
+        Raises:
+            InvalidInputError: naming the part that cannot be.
+        """
+        check(self.parts(), snapshot)
 
     def _set_finished(self, episodes):
         self.finished.clear()
@@ -180,3 +194,9 @@ class EncodedVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class, indices=None):
         """Say whether single environments are wrapped: they are not, they are native."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _check_finished(episodes):
+    plain = isinstance(episodes, list) and len(episodes) <= 100 and all(isinstance(one, dict) for one in episodes)
+    if not plain or not all(isinstance(value, int | float) for one in episodes for value in one.values()):
+        raise InvalidInputError(f"the snapshot holds {shown(episodes)} for finished episodes; start anew")

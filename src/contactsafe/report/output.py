@@ -1,10 +1,11 @@
-"""Files written whole or not at all."""
+"""Where results go."""
 
 import os
 import tempfile
 from pathlib import Path
 
 from contactsafe.errors import OutputError
+from contactsafe.files import replace
 
 _REMEDY = "give a folder you may write to with --out"
 
@@ -33,36 +34,20 @@ def prepare_output(folder) -> Path:
 
 
 def write_whole(path: Path, text: str) -> Path:
-    """Write a text file under another name beside it, then rename it: readers see the old file or the new one.
+    """Write a text file, UTF-8, in one step: readers see the old file or the new one.
 
     Args:
         path: of the file.
-        text: its content, written as UTF-8.
+        text: its content.
 
     Raises:
         OutputError: it cannot be written; the file is as it was.
     """
-    temporary = None
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        replace(path, text.encode())
     except OSError as error:
         raise OutputError(f"cannot write {path}: {_reason(error)}; {_REMEDY}") from None
-    finally:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)  # gone already where all went well
     return path
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _reason(error: OSError) -> str:

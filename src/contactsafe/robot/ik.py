@@ -1,14 +1,13 @@
 """Inverse kinematics: a compiled solver for the 60 Hz path, and a patient one that starts from anywhere."""
 
 import math
-import tempfile
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError, UnreachableError
+from contactsafe.files import readable
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
@@ -131,9 +130,7 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02):
     """
     if TracIK is None or arm.facts is None or arm.tool is None:
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "arm.urdf"  # TracIK reads a file, once
-        path.write_text(arm_urdf(arm.facts, arm.tool), encoding="utf-8")
+    with readable("arm.urdf", arm_urdf(arm.facts, arm.tool)) as path:  # it is read once
         solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=timeout_s)
     solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader rounds them to single precision
     return solver

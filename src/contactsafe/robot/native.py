@@ -6,6 +6,7 @@ and MjData's arrays are seen through `view1`/`view2` at addresses read from NumP
 """
 
 import pathlib
+import sys
 
 import llvmlite.binding
 import mujoco
@@ -41,6 +42,14 @@ def _load_library() -> pathlib.Path:
 
 
 LIBRARY = _load_library()
+
+
+def _warn(message: str) -> None:
+    print(f"MuJoCo: {message}", file=sys.stderr)
+
+
+if mujoco.get_mju_user_warning() is None:
+    mujoco.set_mju_user_warning(_warn)  # its own way writes MUJOCO_LOG.TXT wherever the process stands
 
 _pp = (types.uintp, types.uintp)
 mj_kinematics = types.ExternalFunction("mj_kinematics", types.void(*_pp))

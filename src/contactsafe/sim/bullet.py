@@ -5,16 +5,15 @@ joint, geared to it so high that they hardly feel the link's own turning. A moto
 in the MJCF to 0.4 %; gravity and the links' inertia are the MJCF's to 1e-9.
 """
 
-import tempfile
 import weakref
 import xml.etree.ElementTree as ET
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.files import readable
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import numbers
@@ -176,9 +175,7 @@ class BulletPlant:
 
     def _build_arm(self) -> None:
         bullet, client = self._bullet, self._client
-        with tempfile.TemporaryDirectory() as folder:  # Bullet reads files only
-            path = Path(folder) / "arm.urdf"
-            path.write_text(self._urdf, encoding="utf-8")
+        with readable("arm.urdf", self._urdf) as path:
             flags = bullet.URDF_USE_INERTIA_FROM_FILE
             self._arm = arm = bullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)
         infos = [bullet.getJointInfo(arm, i, physicsClientId=client) for i in range(bullet.getNumJoints(arm, client))]

@@ -51,7 +51,7 @@ class Randomisation:
         """Refuse ranges that are none, or that no world can have."""
         for field in fields(self):
             low, high = getattr(self, field.name)
-            least, most = _POSSIBLE.get(field.name, (-np.inf, np.inf))
+            least, most = POSSIBLE.get(field.name, (-np.inf, np.inf))
             if not least <= low <= high <= most:
                 raise InvalidInputError(
                     f"randomisation {field.name} = ({low}, {high}); give (low, high) "
@@ -80,7 +80,7 @@ class Randomisation:
 
 MAX_DELAY_STEPS = 6
 
-_POSSIBLE = {
+POSSIBLE = {
     "board_height_m": (-0.05, 0.05),
     "board_tilt_rad": (-0.1, 0.1),
     "friction": (0.0, 10.0),

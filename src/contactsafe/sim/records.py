@@ -78,6 +78,19 @@ def plant_dtype(n: int) -> np.dtype:
     )
 
 
+def plant_bounds(bodies: int, cameras: int) -> dict[str, tuple[float, float]]:
+    """Give the fields of a plant that change, and what they may be; the others are what the plant was made with."""
+    ticks, measure = (-1, 2**53), (-1e9, 1e9)
+    return {
+        **dict.fromkeys(("tick", "push_start", "push_stop", "push_ramp", "delay_ticks"), ticks),
+        **dict.fromkeys(("q_seen", "qd_seen", "tau_delayed", "wrench_bias", "push_point", "push_force"), measure),
+        **dict.fromkeys(("friction", "pad_half"), measure),
+        "obstacle_stopped": (0, 1),
+        "push_body": (0, bodies - 1),
+        "camera": (0, cameras - 1),
+    }
+
+
 report_dtype = np.dtype(
     [
         ("tool_force_mean", _f),  # of the ticks, |pad force| by the simulator, N

@@ -10,8 +10,8 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
-from contactsafe.sim.randomisation import MAX_DELAY_STEPS, Randomisation, draw, draw_dtype
-from contactsafe.sim.snapshot import Part, of_array, put, take
+from contactsafe.sim.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
+from contactsafe.sim.snapshot import Part, check, of_array, put, take
 from contactsafe.sim.words import copy_picture, places_unlike
 from contactsafe.sim.world import Worlds
 
@@ -62,10 +62,10 @@ class Variation:
     def parts(self) -> dict[str, Part]:
         """List what decides the future."""
         return {
-            "drawn": Part(self._taken, self._put_drawn),
+            "drawn": Part(self._taken, self._put_drawn, self._check_drawn),
             "frames": of_array(self._frames),
-            "newest": of_array(self._newest),
-            "random": of_array(self._random.view(np.int64)),
+            "newest": of_array(self._newest, 0, MAX_DELAY_STEPS),
+            "random": of_array(self._random.view(np.int64), -np.inf, np.inf),
         }
 
     def snapshot(self) -> dict[str, Any]:
@@ -84,6 +84,16 @@ class Variation:
             self.drawn[name] = value[name]
         for i in range(self._worlds.n):
             self._apply(i)
+
+    def _check_drawn(self, value: Mapping[str, np.ndarray]) -> None:
+        possible = {"camera": (0, CAMERAS - 1), **POSSIBLE}
+        # Before the first draw all are 0.
+        parts = {
+            name: of_array(self.drawn[name], min(low, 0), high)
+            for name, (low, high) in possible.items()
+            if name in (draw_dtype.names or ())
+        }
+        check(parts, value)
 
     def _apply(self, i: int) -> None:
         self._worlds.plants[i]["camera"] = self.drawn[i]["camera"]

@@ -11,17 +11,17 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
-from contactsafe.control.records import controller_dtype, fill_params
+from contactsafe.control.records import controller_dtype, fill_params, index_bounds
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.ink import empty_ledger, enter
-from contactsafe.sim.records import fill_plant, noise_channels, plant_dtype, report_dtype, trace_dtype
+from contactsafe.sim.records import fill_plant, noise_channels, plant_bounds, plant_dtype, report_dtype, trace_dtype
 from contactsafe.sim.scene import build_plant
 from contactsafe.sim.snapshot import Part, of_array, of_generators, of_physics, of_records, put, take
 from contactsafe.sim.stepping import run_ticks
-from contactsafe.sim.whiteboard import INK, Whiteboard
+from contactsafe.sim.whiteboard import CLEAN, INK, OBJECT, Whiteboard
 
 POLICY_RATE_HZ = 60
 """Rate of the policy; 1 kHz does not divide by it, so its steps last 17, 17 and 16 ticks in turn."""
@@ -190,12 +190,13 @@ class Worlds:
 
     def parts(self) -> dict[str, Part]:
         """List what decides the worlds' future, in the order in which it must be put back."""
+        changing = plant_bounds(min(model.nbody for model in self.models), len(self.cameras.pixels))
         return {
             "physics": of_physics(self.models, self.datas),
-            "plants": of_records(self.plants),
-            "controllers": of_records(self.controllers),
+            "plants": of_records(self.plants, changing, fixed=("",)),
+            "controllers": of_records(self.controllers, index_bounds(self.controllers[0]), fixed=("handle", "params")),
             "reports": of_records(self.reports),
-            "cells": of_array(self.cells),
+            "cells": of_array(self.cells, CLEAN, OBJECT),
             "masks": of_array(self.masks),
             "noise": of_generators(self.rngs),
         }
