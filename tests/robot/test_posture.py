@@ -197,7 +197,7 @@ def test_a_locked_joint_stays_and_the_others_serve(panda):
     q_min[2] = q_max[2] = panda.home[2]
     arm = replace(panda, q_min=q_min, q_max=q_max)
     pose = arm.tool_pose(arm.home)
-    q = InverseKinematics(arm).posture(pose._replace(position=pose.position + [0.05, 0.1, -0.1]))
+    q = InverseKinematics(arm).posture(pose._replace(position=np.add(pose.position, [0.05, 0.1, -0.1])))
     assert q[2] == panda.home[2]
 
 
