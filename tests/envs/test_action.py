@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe.envs.action import ACTION_NAMES, DOWN, rotation_from_down
 from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
+from contactsafe.robot.arm import Pose
+from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 
 CONFIG = ActionConfig()
@@ -100,6 +102,16 @@ def test_the_posture_follows_x_d(tasks):
     pose = tasks.arm.tool_pose(target["q_pose"])
     assert_allclose(pose.position, target["position"], atol=1e-3)
     assert abs(pose.quat @ target["quat"]) > 1 - 1e-4
+
+
+def test_the_posture_does_not_depend_on_the_way_of_x_d(tasks):
+    """Round the board and back: warm-started inverse kinematics came back with the elbow elsewhere."""
+    for _ in range(3):
+        for index, value in ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0)):
+            act(tasks, index, value, steps=8)
+        target = tasks.worlds.controllers[0]["target"]
+        pose = Pose(target["position"].copy(), target["quat"].copy())
+        assert_allclose(target["q_pose"], InverseKinematics(tasks.arm).posture(pose), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("rotvec", [(0.0, 0.0, 0.0), (0.1, -0.05, 0.02), (0.0, 0.0, 0.8)])

@@ -49,7 +49,7 @@ def test_reaches_every_pose_from_a_near_seed(panda, reachable, solve):
 
 
 def test_reaches_what_trac_ik_reaches(panda, reachable, solve):
-    reference = trac_ik(panda)
+    reference = trac_ik(panda, timeout_s=2.0)  # it searches by the clock: a busy machine gets less done
     if reference is None:
         pytest.skip("pytracik is not installed")
     for pose, seed, _ in reachable:

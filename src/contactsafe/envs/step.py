@@ -60,12 +60,12 @@ def score(task, report, rewards, ink, distance):
 
 @compiled(nogil=True)
 def step_tasks(
-    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, ledger, limits, q_min, q_max,
+    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, ledger, limits, rule,
     actions, rewards, tasks, masks,
 ):  # fmt: skip
     """Run one policy step of each task from start to stop; the arrays are those of `Worlds` and `WipingTasks`."""
     for i in range(start, stop):
-        apply_action(controllers[i], limits, q_min, q_max, actions[i])
+        apply_action(controllers[i], limits, rule, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
         judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ledger, rewards, tasks[i], masks[i])
 

@@ -14,6 +14,7 @@ from contactsafe.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.posture import posture_rule
 from contactsafe.sim.camera import camera_at
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import draw_board
@@ -85,8 +86,7 @@ class WipingTasks:
         self._rewards["clean_share"] = self.config.clean_share
         self._actions = np.zeros((n, ACTION_SIZE))
         self._ik = InverseKinematics(self.arm)
-        x, y, z = self.config.world.board.centre
-        self._q_centre = self._ik.solve(Pose(np.array([x, y, z + 0.05]), DOWN), self.arm.home)
+        self._rule = posture_rule(self.arm)
 
     def reset(self, i: int, rng: np.random.Generator, drawing: np.ndarray | None = None, start=None) -> None:
         """Begin an episode in task i.
@@ -161,8 +161,8 @@ class WipingTasks:
         put(self.parts(), snapshot)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
-        """Find joint positions for a tool pose, near those over the board's centre, (n,), rad."""
-        return self._ik.solve(pose, self._q_centre)
+        """Give the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
+        return self._ik.solve(pose)
 
     def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
         """Run one policy step in every task.
@@ -188,14 +188,14 @@ class WipingTasks:
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         """Run one policy step of so many ticks, (n,), under `self._actions`, and look."""
-        worlds, arm = self.worlds, self.arm
+        worlds = self.worlds
         worlds.enter_changed()
 
         def share(start: int, stop: int) -> None:
             noise = worlds.draw_noise(start, stop)
             step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
-                worlds.cameras, worlds.ledger, self._limits, arm.q_min, arm.q_max, self._actions, self._rewards[0],
+                worlds.cameras, worlds.ledger, self._limits, self._rule, self._actions, self._rewards[0],
                 self.tasks, worlds.masks,
             )  # fmt: skip
             self._look(start, stop)

@@ -1,4 +1,4 @@
-"""Inverse kinematics: a compiled solver for the 60 Hz path, and a patient one that starts from anywhere."""
+"""Inverse kinematics: the posture that goes with a pose, a near answer to a near seed, and a patient search."""
 
 import math
 from functools import cached_property
@@ -11,6 +11,7 @@ from contactsafe.files import readable
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
+from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture, posture_rule
 from contactsafe.robot.rotation import orientation_error, quat_to_matrix
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 
@@ -18,12 +19,6 @@ try:
     from trac_ik import TracIK
 except ImportError:  # no wheel for this platform: the compiled solver serves alone
     TracIK = None
-
-POSITION_TOLERANCE = 1e-4
-"""A pose counts as reached within this, m."""
-
-ROTATION_TOLERANCE = math.radians(0.01)
-"""A pose counts as reached within this, rad."""
 
 _SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
@@ -42,22 +37,52 @@ class InverseKinematics:
 
     def __init__(self, arm: Arm):
         self._arm = arm
+        self._rule = posture_rule(arm)
         self._nominal = arm.nominal()
         low, high = finite_range(arm.q_min, arm.q_max)
         middle = (low + high) / 2
         spread = np.random.default_rng(0).uniform(low, high, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
 
-    def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
-        """Find joint positions within the limits that put the tool at a pose.
+    def __reduce__(self):
+        """Pickle by setting up anew."""
+        return InverseKinematics, (self._arm,)
 
-        Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then from home and from other fixed
-        postures; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from facts. The same
+    def posture(self, pose: Pose) -> np.ndarray:
+        """Give the posture of a pose: of the joint positions that reach it, the ones nearest home.
+
+        A function of the pose alone, to the bit, in bounded time; docs/concepts/posture.md says what is nearest and
+        where a small change of the pose is a small change of the posture.
+
+        Args:
+            pose: of the tool, world; position (3,) m, unit quaternion w x y z (4,).
+
+        Returns:
+            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and `ROTATION_TOLERANCE`.
+
+        Raises:
+            InvalidInputError: wrong shape, not finite, or a quaternion that is not of unit length to 1e-3.
+            UnreachableError: out of reach, or only by a way that `solve` may find in longer time.
+        """
+        position, quat = _checked_pose(pose)
+        q, reached = self._posture(position, quat)
+        if not reached:
+            raise UnreachableError(
+                f"pose at {_position_words(position)} has no posture within reach of home's, or none at all; move it "
+                "towards the arm, turn it, or give a posture of your own, such as InverseKinematics.solve may find"
+            )
+        return q
+
+    def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
+        """Find joint positions within the limits that put the tool at a pose, however long it takes.
+
+        Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then `posture`; then home and other
+        fixed seeds; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from facts. The same
         call on the same arm gives the same answer, unless it was TRAC-IK's, whose search is random.
 
         Args:
             pose: of the tool, world; position (3,) m, unit quaternion w x y z (4,).
-            q_seed: where to start, (n,), rad; home where None.
+            q_seed: where to start, (n,), rad; None for the posture of the pose.
 
         Returns:
             Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and `ROTATION_TOLERANCE`.
@@ -67,21 +92,28 @@ class InverseKinematics:
             UnreachableError: no solution found.
         """
         position, quat = _checked_pose(pose)
-        first = self._arm.home if q_seed is None else self._arm.joint_vector(q_seed, "q_seed")
+        near = [] if q_seed is None else [self._arm.joint_vector(q_seed, "q_seed")]
+        for seed in near:
+            q, error = self._from_seed(position, quat, seed)
+            if _reached(error):
+                return q
+        q, reached = self._posture(position, quat)
+        if reached:
+            return q
         nearest = (math.inf, math.inf)
-        for seed in (first, *self._seeds):
+        for seed in (*near, *self._seeds):
             q, error = self._from_seed(position, quat, seed)
             if _reached(error):
                 return q
             nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + e[1] / ROTATION_TOLERANCE)
         if self._reference is not None:
-            found = self._reference.ik(position, quat_to_matrix(quat), first)
+            found = self._reference.ik(position, quat_to_matrix(quat), (*near, self._arm.home)[0])
             if found is not None:
                 q, error = self._from_seed(position, quat, found)
                 if _reached(error):
                     return q
         raise UnreachableError(
-            f"pose at [{', '.join(f'{x:.3f}' for x in position)}] m was not reached: the nearest found is "
+            f"pose at {_position_words(position)} was not reached: the nearest found is "
             f"{_error_words(*nearest)} away, allowed is {_error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
             "move it towards the arm, turn it, or give another q_seed"
         )
@@ -90,10 +122,19 @@ class InverseKinematics:
     def _reference(self):
         return trac_ik(self._arm)  # only where the compiled solver fails: building it takes 10 ms
 
+    def _posture(self, position, quat) -> tuple[np.ndarray, bool]:
+        q = np.empty(self._arm.n)
+        return q, _reached(find_posture(self._rule, position, quat, q))
+
     def _from_seed(self, position, quat, seed):
         q = np.empty(self._arm.n)
         error = solve_ik(self._nominal.handle, position, quat, seed, self._arm.q_min, self._arm.q_max, q)
         return q, error
+
+
+def _position_words(position: np.ndarray) -> str:
+    """Write a position for a message."""
+    return f"[{', '.join(f'{x:.3f}' for x in position)}] m"
 
 
 def _error_words(position_error_m: float, rotation_error_rad: float) -> str:

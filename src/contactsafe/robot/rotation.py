@@ -30,7 +30,12 @@ def matrix_to_quat(R):
 
     Picks the largest component first, so it is accurate at every angle (Shepperd 1978).
     """
-    quat = np.empty(4)
+    return matrix_to_quat_into(R, np.empty(4))
+
+
+@compiled
+def matrix_to_quat_into(R, quat):
+    """Write the quaternion of `matrix_to_quat` to `quat`, (4,), and give it back."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace > 0.0:
         s = 2.0 * math.sqrt(trace + 1.0)
