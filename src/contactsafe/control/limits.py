@@ -79,51 +79,63 @@ def coming_speed(qd, M_inv, momentum_rate, step_max, dt):
 
 
 @compiled
+def joint_stop_gains(M, gain, stiffness, damping, limits, delay_s, brake, spring, drag):
+    """Fill what the joint stops may brake and push back with, kept within what each joint takes (`control.damping`).
+
+    Args:
+        M: joint inertia, (n, n), kg m².
+        gain: braking per excess of speed, 1/s.
+        stiffness: N m/rad of intrusion.
+        damping: that acts on each joint already, (n,), N m s/rad.
+        limits: what all of it may come to, (n,), N m s/rad.
+        delay_s: of the loop, s.
+        brake: (n,), N m s/rad; filled: in proportion to the inertia that the joint moves.
+        spring: (n,), N m/rad; filled: no more than lets damping make up twice for its delay.
+        drag: (n,), N m s/rad; filled: that damping, where the brake does not act.
+    """
+    for i in range(brake.shape[0]):
+        brake[i] = min(gain * M[i, i], max(limits[i] - damping[i], 0.0))
+        spring[i] = min(stiffness, (damping[i] + brake[i]) / (2.0 * delay_s))
+        drag[i] = min(2.0 * delay_s * spring[i], brake[i])
+
+
+@compiled
 def joint_stop_torque(
-    tau_net, q, qd, M, speed, ahead, q_min, q_max, qd_max, margin, stiffness, deceleration, gain, damping, limits, delay_s
-):
+    tau_net, q, qd, speed, ahead, q_min, q_max, qd_max, margin, deceleration, brake, spring, drag
+):  # fmt: skip
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
     A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
     what counts is the speed that it will have before the torque that drives it can be taken off. What is faster is
-    braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a spring pushes back.
-    Both stay within what the joint takes (`control.damping`).
+    braked, and what pushes it on fades; within the margin a spring pushes back, damped on the way out as well.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
         q, qd: (n,), rad and rad/s.
-        M: joint inertia, (n, n), kg m².
         speed: by then, (n,), rad/s; see `coming_speed`.
         ahead: time until then, (n,), s.
         q_min, q_max: range, (n,), rad.
         qd_max: speed limits, (n,), rad/s.
         margin: rad.
-        stiffness: N m/rad of intrusion.
         deceleration: a, rad/s².
-        gain: braking per excess of speed, 1/s.
-        damping: that acts on each joint already, (n,), N m s/rad.
-        limits: what it may come to, (n,), N m s/rad.
-        delay_s: of the loop, s.
+        brake: per excess of speed, (n,), N m s/rad.
+        spring: per intrusion, (n,), N m/rad.
+        drag: on the way out of the margin, (n,), N m s/rad.
     """
     for i in range(q.shape[0]):
         way = 1.0 if speed[i] > 0.0 else -1.0
         left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin - max(way * qd[i], 0.0) * ahead[i]
         excess = way * speed[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
-        brake = min(gain * M[i, i], limits[i] - damping[i])
         if excess > 0.0:
             on = max(way * tau_net[i], 0.0) * min(excess / _FADE_RAD_S, 1.0)
-            tau_net[i] -= way * (on + brake * excess)
+            tau_net[i] -= way * (on + brake[i] * excess)
         low, high = q_min[i] + margin - q[i], q[i] - q_max[i] + margin
-        if low <= 0.0 and high <= 0.0:
-            continue
-        spring = min(stiffness, (damping[i] + brake) / (2.0 * delay_s))
-        drag = min(2.0 * delay_s * spring, brake)  # what the spring's delay takes away, twice
         if low > 0.0:
-            tau_net[i] = max(tau_net[i], -max(1.0 - low / margin, 0.0) * abs(tau_net[i])) + spring * low
-            tau_net[i] -= drag * max(qd[i], 0.0)
-        else:
-            tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - spring * high
-            tau_net[i] -= drag * min(qd[i], 0.0)
+            tau_net[i] = max(tau_net[i], -max(1.0 - low / margin, 0.0) * abs(tau_net[i])) + spring[i] * low
+            tau_net[i] -= drag[i] * max(qd[i], 0.0)
+        elif high > 0.0:
+            tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - spring[i] * high
+            tau_net[i] -= drag[i] * min(qd[i], 0.0)
 
 
 @compiled

@@ -26,7 +26,7 @@ from contactsafe.control.laws import (
     task_nullspace,
     tool_share,
 )
-from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_torque, passive_step, power_limit
+from contactsafe.control.limits import coming_speed, joint_stop_gains, joint_stop_torque, limit_torque, passive_step, power_limit
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
@@ -315,10 +315,15 @@ def _finish(c, tau):
     q, qd = c.measurement.q, c.measurement.qd
     tau -= dynamics.g + dynamics.c
     speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
+    n = tau.shape[0]
+    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
+    joint_stop_gains(
+        dynamics.M, params.joint_brake, params.joint_stop_stiffness, state.joint_damping, state.damping_limit,
+        params.loop_delay_s, brake, spring, drag,
+    )  # fmt: skip
     joint_stop_torque(
-        tau, q, qd, dynamics.M, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
-        params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake, state.joint_damping,
-        state.damping_limit, params.loop_delay_s,
+        tau, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        params.joint_deceleration, brake, spring, drag,
     )  # fmt: skip
     tau += dynamics.c
     power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
