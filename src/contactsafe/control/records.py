@@ -19,7 +19,7 @@ _f = np.float64
 _i = np.int64
 
 UNKNOWN_SPEED_LIMIT = 4.0 * math.pi
-"""Speed beyond which a joint whose limit is not known runs away, rad/s: two turns a second."""
+"""Speed limit of a joint whose own is not known, rad/s: two turns a second, more than arms of a person's size do."""
 
 FREE, CONTACT = 0, 1
 """Modes of the supervisor."""
@@ -263,8 +263,8 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["damping_rate"] = damping_rate(config, GAIN_MARGIN)
     params["braking_rate"] = damping_rate(config, BRAKING_MARGIN)
     params["q_min"], params["q_max"] = arm.q_min, arm.q_max
-    params["qd_max"] = config.joint_speed_fraction * arm.qd_max
     params["runaway_speed"] = np.where(np.isfinite(arm.qd_max), arm.qd_max, UNKNOWN_SPEED_LIMIT)
+    params["qd_max"] = config.joint_speed_fraction * params["runaway_speed"]
     # From full drive to full braking, and the lag of what is measured.
     params["reversal_s"] = 2.0 * arm.tau_max / arm.torque_rate_max + 10.0 * config.loop_delay_s
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction

@@ -152,9 +152,11 @@ def _watch_speed(c):
     state, params = c.state, c.params
     for i in range(state.overspeed_s.shape[0]):
         excess = abs(c.measurement.qd[i]) - params.runaway_speed[i]
-        state.overspeed_s[i] = state.overspeed_s[i] + params.dt if excess > 0.0 else 0.0
-        braking_s = params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]
-        if state.overspeed_s[i] > braking_s:
+        if excess <= 0.0:
+            state.overspeed_s[i] = 0.0
+            continue
+        state.overspeed_s[i] += params.dt
+        if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
             state.fault = _RUNAWAY
 
 
