@@ -119,16 +119,20 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
     target, wrench = hold, np.zeros(6) if sensor else None
     corner = np.where(rng.random(arm.n) < 0.5, arm.q_min, arm.q_max)
     body, force = _push(model, data, arm, rng)
+    way = rng.normal(size=3)
+    way *= 0.2 / np.linalg.norm(way)
     finite, over, longest, top, energy, most, before = True, np.zeros(arm.n), 0, 0.0, 0.0, 0.0, np.zeros(arm.n)
     for tick in range(LIMITS):
+        if RELEASED <= tick < SWEPT:
+            target = hold._replace(pose=hold.pose._replace(position=hold.pose.position + _done(tick - RELEASED) * way))
+        elif tick >= SWEPT:
+            q = start + _done(tick - SWEPT) * (corner - start)
+            target = cs.Target(arm.tool_pose(q), STIFFNESS, posture=q)
         data.xfrc_applied[body, :3] = force * min((tick - HELD) / 20, 1.0) if HELD <= tick < PUSHED else 0.0
         if tick == RELEASED:
-            way = rng.normal(size=3)
-            target = hold._replace(pose=hold.pose._replace(position=hold.pose.position + 0.15 * way))
-            data.mocap_pos[0] = data.site("tip").xpos + 0.08 * way / np.linalg.norm(way)
+            data.mocap_pos[0] = data.site("tip").xpos + 0.5 * way
         elif tick == SWEPT:
             data.mocap_pos[0] = (0.0, 0.0, 100.0)
-            target = cs.Target(arm.tool_pose(corner), STIFFNESS, posture=corner)
         out = controller.step(cs.Measurement(data.qpos[at.qpos], data.qvel[at.dof], wrench), target)
         finite = finite and bool(np.isfinite(out.torque).all())
         data.ctrl[at.ctrl] = out.torque / at.gear
@@ -144,6 +148,12 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
             longest = LIMITS
             break
     return Run(finite, longest, top, most, out.fault)
+
+
+def _done(ticks: int) -> float:
+    """Share of a motion of 0.8 s that is done, without a jump of speed."""
+    share = min(ticks / 800, 1.0)
+    return share**2 * (3.0 - 2.0 * share)
 
 
 def _push(model, data, arm, rng) -> tuple[int, np.ndarray]:

@@ -58,7 +58,7 @@ def stop(tau, q, qd, in_force=(0.0, 0.0)):
     out, qd = np.array(tau, dtype=float), np.array(qd, dtype=float)
     speed, ahead = coming_speed(qd, np.linalg.inv(M), np.array(in_force), 1.0, 0.001)
     joint_stop_torque(
-        out, np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, *gains()
+        out, np.linalg.inv(M), np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, *gains()
     )
     return out
 

@@ -324,11 +324,11 @@ def _finish(c, tau):
         params.loop_delay_s, brake, spring, drag,
     )  # fmt: skip
     joint_stop_torque(
-        tau, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        tau, dynamics.M_inv, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
         params.joint_deceleration, brake, spring, drag,
     )  # fmt: skip
     tau += dynamics.c
-    power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
+    power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s)
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
