@@ -126,6 +126,7 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
         if RELEASED <= tick < SWEPT:
             target = hold._replace(pose=hold.pose._replace(position=hold.pose.position + _done(tick - RELEASED) * way))
         elif tick >= SWEPT:
+            start = data.qpos[at.qpos].copy() if tick == SWEPT else start
             q = start + _done(tick - SWEPT) * (corner - start)
             target = cs.Target(arm.tool_pose(q), STIFFNESS, posture=q)
         data.xfrc_applied[body, :3] = force * min((tick - HELD) / 20, 1.0) if HELD <= tick < PUSHED else 0.0
