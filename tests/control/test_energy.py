@@ -60,17 +60,18 @@ torques = arrays(float, 7, elements=st.floats(-200.0, 200.0))
 speeds = arrays(float, 7, elements=st.floats(-3.0, 3.0))
 
 
-@given(torques, speeds, st.floats(-5.0, 10.0), st.floats(0.0, 50.0))
-def test_no_more_power_than_the_tank_can_pay(tau, qd, tank, power):
-    """What is taken off is the least that does it: along q̇."""
+@given(torques, speeds, arrays(float, 7, elements=st.floats(1e-3, 2.0)), st.floats(-5.0, 10.0), st.floats(0.0, 50.0))
+def test_no_more_power_than_the_tank_can_pay(tau, qd, moments, tank, power):
+    """What is taken off brakes all joints at one rate, by their inertia: along M q̇."""
+    M = np.diag(moments) + 0.01
     asked, allowed = tau.copy(), power + max(tank, 0.0) / 0.1
-    power_limit(tau, qd, tank, power, 0.1)
-    if asked @ qd <= allowed or qd @ qd <= 1e-12:  # or it stands still
+    power_limit(tau, M, qd, tank, power, 0.1)
+    if asked @ qd <= allowed or qd @ M @ qd <= 1e-12:  # or it stands still
         assert_array_equal(tau, asked)
     else:
         assert_allclose(tau @ qd, allowed, rtol=1e-6, atol=1e-6)
-        off = asked - tau
-        assert_allclose(off, qd * (off @ qd) / (qd @ qd), rtol=1e-6, atol=1e-6)
+        off, momentum = asked - tau, M @ qd
+        assert_allclose(off, momentum * (off @ qd) / (momentum @ qd), rtol=1e-6, atol=1e-6)
 
 
 def energy_over_tank(arm, every, seed, ticks=4000):

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, controller_at, reach
 
 from contactsafe import Measurement, presets
-from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_torque
+from contactsafe.control.limits import coming_speed, joint_stop_gains, joint_stop_torque, limit_torque
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
 torques = arrays(float, 3, elements=st.floats(-1e6, 1e6))
@@ -43,14 +43,43 @@ M = np.diag([0.8, 0.2])
 MARGIN, STIFFNESS, DECELERATION, BRAKE = 0.1, 200.0, 8.0, 50.0
 
 
+NONE, PLENTY, DELAY_S = np.zeros(2), np.full(2, 1e6), 0.002
+
+
+def gains(damping=NONE, limits=PLENTY, stiffness=STIFFNESS):
+    """Give brake, spring and drag of the joint stops."""
+    brake, spring, drag = np.empty(2), np.empty(2), np.empty(2)
+    joint_stop_gains(M, BRAKE, stiffness, np.array(damping), np.array(limits), DELAY_S, brake, spring, drag)
+    return brake, spring, drag
+
+
 def stop(tau, q, qd, in_force=(0.0, 0.0)):
     """Give what a command becomes at the joint stops, with another one in force."""
     out, qd = np.array(tau, dtype=float), np.array(qd, dtype=float)
     speed, ahead = coming_speed(qd, np.linalg.inv(M), np.array(in_force), 1.0, 0.001)
     joint_stop_torque(
-        out, np.array(q), qd, M, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, STIFFNESS, DECELERATION, BRAKE
-    )  # fmt: skip
+        out, np.linalg.inv(M), np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, *gains()
+    )
     return out
+
+
+@given(*[st.floats(0.0, 200.0)] * 2, *[st.floats(0.0, 1e3)] * 2, st.floats(1.0, 1e6))
+def test_joint_stops_stay_within_what_a_light_joint_takes(damping, more, limit, other, stiffness):
+    """Brake and what damps already never pass the limit; the spring's delay is made up for twice over."""
+    damping, limits = np.minimum([damping, more], [limit, other]), np.array([limit, other])
+    brake, spring, drag = gains(damping, limits, stiffness)
+    assert (damping + brake <= limits + 1e-9).all()
+    assert (brake <= BRAKE * np.diag(M) + 1e-12).all()
+    assert (2.0 * DELAY_S * spring <= damping + brake + 1e-9).all()
+    assert (spring <= stiffness).all()
+    assert (2.0 * DELAY_S * spring <= damping + drag + 1e-9).all()
+
+
+def test_joint_stops_of_a_heavy_joint_are_as_configured():
+    brake, spring, drag = gains()
+    assert_allclose(brake, BRAKE * np.diag(M))
+    assert_allclose(spring, STIFFNESS)
+    assert_allclose(drag, 2.0 * DELAY_S * STIFFNESS)
 
 
 def allowed_speed(left):
@@ -132,7 +161,7 @@ def test_what_pushes_outwards_fades_over_the_margin(push, depth):
 @given(st.floats(0.0, 100.0), st.floats(1e-6, 0.5))
 def test_what_pushes_inwards_is_left_and_helped(push, depth):
     left = stop([push, 0.0], [-1.9 - depth, -2.0], [0.5, 0.0])[0]
-    assert_allclose(left, push + STIFFNESS * depth, rtol=1e-9, atol=1e-9)
+    assert_allclose(left, push + STIFFNESS * depth - 2.0 * DELAY_S * STIFFNESS * 0.5, rtol=1e-9, atol=1e-9)
 
 
 @given(st.floats(-100.0, 100.0), st.floats(0.0, 1e-9))

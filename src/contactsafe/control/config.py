@@ -5,11 +5,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from contactsafe.control.damping import GAIN_MARGIN, largest_damping
 from contactsafe.errors import InvalidInputError
 
 _PER_JOINT = ("K_pose", "D_pose")
 _POSITIVE = (
-    "dt", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n", "meet_s", "hold_s",
+    "dt", "loop_delay_s", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n", "meet_s", "hold_s",
     "tank_s",
 )  # fmt: skip
 _SHARES = ("release_fraction", "joint_speed_fraction", "torque_rate_fraction")
@@ -82,6 +83,8 @@ class ControllerConfig:
         tank_power_w: power that it may give for ever, W.
         tank_s: least time in which it may give what the tank holds, s.
         torque_rate_fraction: share of the arm's torque-rate limit that is used.
+        loop_delay_s: from the measurement of a velocity to the torque that answers it, beyond the tick itself, s:
+            filters, transport, motors. Damping and stiffness are kept below what it makes unstable.
         dt: tick, s.
     """
 
@@ -140,6 +143,7 @@ class ControllerConfig:
     tank_power_w: float = 0.0
     tank_s: float = 0.1
     torque_rate_fraction: float = 0.999
+    loop_delay_s: float = 0.002
     dt: float = 0.001
 
     def __post_init__(self):
@@ -160,6 +164,12 @@ class ControllerConfig:
             low, high = getattr(self, name)
             if not low < high:
                 raise InvalidInputError(f"{name} = ({low}, {high}) is empty; give (lowest, highest)")
+        highest = damping_rate(self, GAIN_MARGIN)
+        if not self.damping_range[1] < highest:
+            raise InvalidInputError(
+                f"damping_range = {self.damping_range} reaches what a delay of {self.loop_delay_s} s at a tick of "
+                f"{self.dt} s makes unstable; keep it below {highest:.4g} 1/s, or make the loop faster"
+            )
         for unit in ("nm", "n"):
             hold, yields = getattr(self, f"push_hold_{unit}"), getattr(self, f"push_yield_{unit}")
             if hold < yields:
@@ -167,6 +177,11 @@ class ControllerConfig:
                     f"push_hold_{unit} = {hold} is below push_yield_{unit} = {yields}; "
                     "the arm may push harder to hold than to yield, never less"
                 )
+
+
+def damping_rate(config: ControllerConfig, margin: float) -> float:
+    """Return the damping per inertia that stays a margin below what the loop makes unstable, 1/s."""
+    return largest_damping(config.loop_delay_s / config.dt) / (margin * config.dt)
 
 
 def _check_numbers(name: str, value, default) -> None:

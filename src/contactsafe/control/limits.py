@@ -5,10 +5,11 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matvec
+from contactsafe.robot.linalg import dot, matvec, matvec_into
+from contactsafe.robot.stack import stack_vector
 
 _STILL = 1e-12
-"""Speed squared below which an arm stands still, rad²/s²: no torque gives it any power worth the name."""
+"""Twice the energy of an arm that stands still, J: no torque gives it any power worth the name."""
 
 _FADE_RAD_S = 0.4
 """Excess of speed at which nothing pushes a joint on any more, rad/s."""
@@ -37,14 +38,15 @@ def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
 
 
 @compiled
-def power_limit(tau_net, qd, tank, power, drain_s):
+def power_limit(tau_net, M, qd, tank, power, drain_s):
     """Damp a command in place so that it gives the arm no more power than a tank of energy can pay.
 
     The tank is filled with a steady power and by what the command takes out of the arm. Its level falls no faster than
-    level/drain_s beyond that power; the torque taken off is the smallest that does it, along q̇.
+    level/drain_s beyond that power; what is taken off brakes all joints alike, along M q̇: it turns no light joint back.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
+        M: joint inertia, (n, n), kg m².
         qd: (n,), rad/s.
         tank: level, J.
         power: steady, W.
@@ -52,10 +54,13 @@ def power_limit(tau_net, qd, tank, power, drain_s):
     """
     allowed = power + max(tank, 0.0) / drain_s
     given = dot(tau_net, qd)
-    speed = dot(qd, qd)
-    if given > allowed and speed > _STILL:
+    if given <= allowed:
+        return
+    momentum = matvec_into(M, qd, stack_vector(qd.shape[0]))
+    energy = dot(momentum, qd)
+    if energy > _STILL:
         for i in range(qd.shape[0]):
-            tau_net[i] -= (given - allowed) / speed * qd[i]
+            tau_net[i] -= (given - allowed) / energy * momentum[i]
 
 
 @compiled
@@ -79,38 +84,69 @@ def coming_speed(qd, M_inv, momentum_rate, step_max, dt):
 
 
 @compiled
-def joint_stop_torque(tau_net, q, qd, M, speed, ahead, q_min, q_max, qd_max, margin, stiffness, deceleration, gain):
+def joint_stop_gains(M, gain, stiffness, damping, limits, delay_s, brake, spring, drag):
+    """Fill what the joint stops may brake and push back with, kept within what each joint takes (`control.damping`).
+
+    Args:
+        M: joint inertia, (n, n), kg m².
+        gain: braking per excess of speed, 1/s.
+        stiffness: N m/rad of intrusion.
+        damping: that acts on each joint already, (n,), N m s/rad.
+        limits: what all of it may come to, (n,), N m s/rad.
+        delay_s: of the loop, s.
+        brake: (n,), N m s/rad; filled: in proportion to the inertia that the joint moves.
+        spring: (n,), N m/rad; filled: no more than lets damping make up twice for its delay.
+        drag: (n,), N m s/rad; filled: that damping, where the brake does not act.
+    """
+    for i in range(brake.shape[0]):
+        brake[i] = min(gain * M[i, i], max(limits[i] - damping[i], 0.0))
+        spring[i] = min(stiffness, (damping[i] + brake[i]) / (2.0 * delay_s))
+        drag[i] = min(2.0 * delay_s * spring[i], brake[i])
+
+
+@compiled
+def joint_stop_torque(
+    tau_net, M_inv, q, qd, speed, ahead, q_min, q_max, qd_max, margin, deceleration, brake, spring, drag
+):  # fmt: skip
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
     A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
     what counts is the speed that it will have before the torque that drives it can be taken off. What is faster is
-    braked in proportion to the joint's inertia, and what pushes it on fades; within the margin a spring pushes back.
+    braked, and what pushes it on fades; within the margin a spring pushes back, damped on the way out as well.
+    What pushes a joint on is the acceleration that the whole command gives it, as a torque of its own,
+    (M⁻¹ τ)_i/(M⁻¹)_ii: on a chain of parallel axes its own torque may hold it against all the others'.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
         q, qd: (n,), rad and rad/s.
-        M: joint inertia, (n, n), kg m².
         speed: by then, (n,), rad/s; see `coming_speed`.
         ahead: time until then, (n,), s.
         q_min, q_max: range, (n,), rad.
         qd_max: speed limits, (n,), rad/s.
         margin: rad.
-        stiffness: N m/rad of intrusion.
         deceleration: a, rad/s².
-        gain: braking per excess of speed, 1/s.
+        brake: per excess of speed, (n,), N m s/rad.
+        spring: per intrusion, (n,), N m/rad.
+        drag: on the way out of the margin, (n,), N m s/rad.
     """
     for i in range(q.shape[0]):
         way = 1.0 if speed[i] > 0.0 else -1.0
         left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin - max(way * qd[i], 0.0) * ahead[i]
         excess = way * speed[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
-        if excess > 0.0:
-            on = max(way * tau_net[i], 0.0) * min(excess / _FADE_RAD_S, 1.0)
-            tau_net[i] -= way * (on + gain * M[i, i] * excess)
         low, high = q_min[i] + margin - q[i], q[i] - q_max[i] + margin
+        if excess <= 0.0 and low <= 0.0 and high <= 0.0:
+            continue
+        push = dot(M_inv[i], tau_net) / M_inv[i, i]
+        change = 0.0
+        if excess > 0.0:
+            change = -way * (max(way * push, 0.0) * min(excess / _FADE_RAD_S, 1.0) + brake[i] * excess)
+        push += change
         if low > 0.0:
-            tau_net[i] = max(tau_net[i], -max(1.0 - low / margin, 0.0) * abs(tau_net[i])) + stiffness * low
+            change += min(low / margin, 1.0) * max(-push, 0.0) + spring[i] * low - drag[i] * max(qd[i], 0.0)
         elif high > 0.0:
-            tau_net[i] = min(tau_net[i], max(1.0 - high / margin, 0.0) * abs(tau_net[i])) - stiffness * high
+            change -= min(high / margin, 1.0) * max(push, 0.0) + spring[i] * high + drag[i] * min(qd[i], 0.0)
+        tau_net[i] += change
 
 
 @compiled

@@ -8,7 +8,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from contactsafe.control.config import ControllerConfig
+from contactsafe.control.config import ControllerConfig, damping_rate
+from contactsafe.control.damping import BRAKING_MARGIN, GAIN_MARGIN
 from contactsafe.control.laws import observer_gain
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.dynamics import dynamics_dtype, handle_dtype
@@ -16,6 +17,9 @@ from contactsafe.robot.mobility import best_mobility
 
 _f = np.float64
 _i = np.int64
+
+UNKNOWN_SPEED_LIMIT = 4.0 * math.pi
+"""Speed limit of a joint whose own is not known, rad/s: two turns a second, more than arms of a person's size do."""
 
 FREE, CONTACT = 0, 1
 """Modes of the supervisor."""
@@ -28,6 +32,7 @@ FAULTS = {
     4: "target stiffness or damping is out of range; the last good target holds",
     5: "measurements stayed unusable for 20 ticks; gravity compensation only",
     6: "the law gave no finite torque; the last torque was repeated",
+    11: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
 }
 """What `fault` in the state and output means; the first one is latched until reset, but 5 replaces it."""
 
@@ -87,12 +92,15 @@ def params_dtype(n: int) -> np.dtype:
                 "damping_min",
                 "damping_max",
                 "torque_step",
+                "damping_rate",
+                "braking_rate",
                 "posture_in_contact",
             )
         ]
         + [(name, _f) for name in _SHARES]
         + [("dwell_ticks", _i), ("release_ticks", _i)]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "qd_max", "tau_max")]
+        + [("runaway_speed", _f, (n,)), ("reversal_s", _f, (n,))]
         + [("friction", _f, (n, 3)), ("mass_variance", _f, (n + 1,))]
     )
 
@@ -177,6 +185,10 @@ def _commanded(n: int) -> list[tuple]:
         ("K_task", _f, (6,)),  # in force, 1/s²
         ("D_task", _f, (6,)),  # in force, 1/s
         ("tank_j", _f),  # energy that the command may still give, J
+        ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
+        ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
+        ("damping_share", _f, (n,)),  # of each joint's damping in force
+        ("overspeed_s", _f, (n,)),  # time beyond the speed limit, s
         ("posture_share", _f),  # of K_pose in force
         ("task_share", _f),  # of what pulls to the target in force, 0 … 1
     ]
@@ -260,9 +272,15 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["mass_variance"] = _mass_variance(config, arm)
     params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
-    params["D_pose"] = _per_joint(config.D_pose, arm.n)
+    # A spring that acts late drives what it holds, as a damper of −K τ would: put in twice that at least.
+    params["D_pose"] = np.maximum(_per_joint(config.D_pose, arm.n), 2.0 * config.loop_delay_s * params["K_pose"])
+    params["damping_rate"] = damping_rate(config, GAIN_MARGIN)
+    params["braking_rate"] = damping_rate(config, BRAKING_MARGIN)
     params["q_min"], params["q_max"] = arm.q_min, arm.q_max
-    params["qd_max"] = config.joint_speed_fraction * arm.qd_max
+    params["runaway_speed"] = np.where(np.isfinite(arm.qd_max), arm.qd_max, UNKNOWN_SPEED_LIMIT)
+    params["qd_max"] = config.joint_speed_fraction * params["runaway_speed"]
+    # From full drive to full braking, and the lag of what is measured.
+    params["reversal_s"] = 2.0 * arm.tau_max / arm.torque_rate_max + 10.0 * config.loop_delay_s
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
 
 

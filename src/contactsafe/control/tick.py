@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
+
 from contactsafe.compiled import compiled
+from contactsafe.control.damping import braking_limit, joint_damping_limits, share_damping, task_damping_into
 from contactsafe.control.estimate import (
     LOST_AFTER_TICKS,
     correct_gravity,
@@ -23,14 +26,16 @@ from contactsafe.control.laws import (
     task_nullspace,
     tool_share,
 )
-from contactsafe.control.limits import coming_speed, joint_stop_torque, limit_torque, passive_step, power_limit
+from contactsafe.control.limits import coming_speed, joint_stop_gains, joint_stop_torque, limit_torque, passive_step, power_limit
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
 from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
+from contactsafe.robot.stack import stack_vector
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST, _NO_TORQUE = 1, 2, 3, 4, 5, 6
+_RUNAWAY = 11
 
 _ABSURD = 1e6
 """No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
@@ -61,7 +66,11 @@ def control_tick(c):
     part_tool_from_arm(c, J_bar)
     supervise(c)
     weigh_links(c)
-    tau = _law(c, Lambda, J_bar)
+    _watch_speed(c)
+    if c.state.fault == _RUNAWAY:
+        tau = _brake(c)
+    else:
+        tau = _law(c, Lambda, J_bar)
     _finish(c, tau)
 
 
@@ -138,6 +147,29 @@ def _accept_target(c):
 
 
 @compiled
+def _watch_speed(c):
+    """Latch a fault where a joint stays beyond its speed limit for longer than braking it takes."""
+    state, params = c.state, c.params
+    for i in range(state.overspeed_s.shape[0]):
+        excess = abs(c.measurement.qd[i]) - params.runaway_speed[i]
+        if excess <= 0.0:
+            state.overspeed_s[i] = 0.0
+            continue
+        state.overspeed_s[i] += params.dt
+        if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
+            state.fault = _RUNAWAY
+
+
+@compiled
+def _brake(c):
+    """Damp all joints as much as they take, and carry the arm's weight: what is left to do when the arm runs away."""
+    state, dynamics = c.state, c.dynamics
+    joint_damping_limits(dynamics.M_inv, c.params.damping_rate, state.damping_limit)
+    state.joint_damping[:] = state.damping_limit
+    return dynamics.c + dynamics.g - state.damping_limit * c.measurement.qd
+
+
+@compiled
 def _law(c, Lambda, J_bar):
     """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m.
 
@@ -145,7 +177,6 @@ def _law(c, Lambda, J_bar):
     peace, scales the one and never the other.
     """
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
-    q, qd = c.measurement.q, c.measurement.qd
     passive_step(
         state.K_task,
         state.D_task,
@@ -158,14 +189,14 @@ def _law(c, Lambda, J_bar):
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     c.output.error[:] = error
     F_spring = stiffness_wrench(Lambda, error, state.K_task, params.pull_max_m_s2, params.pull_max_rad_s2)
-    q_error = target.q_pose - q
-    shorten(q_error, params.posture_error_max_rad)
-    F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, state.D_task)
+    D_task = task_damping_into(state.K_task, state.D_task, params.loop_delay_s, stack_vector(6))
+    F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
+    _limit_damping(c, D_task.max())
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    _follow_posture(state, params)
-    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, state.posture_share * params.K_pose * q_error)
-    damping = matvec_t(dynamics.J, F_damping) - matvec_t(N_ct, params.D_pose * qd)
+    tau_spring, tau_damping = _posture(c)
+    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, tau_spring)
+    damping = matvec_t(dynamics.J, F_damping) + matvec_t(N_ct, tau_damping)
     observer_step(state.tool_force, params.probe_share, _tool_force(c, J_bar))
     share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
@@ -173,8 +204,38 @@ def _law(c, Lambda, J_bar):
         _follow_share(state, params, share)
         tau = state.task_share * pull + damping + state.unweighed
     else:
-        tau = _contact_law(c, pull, damping, matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque)), N_t - N_ct, share)
+        disturbance = matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque))
+        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, D_task.max())
     return tau + dynamics.c + dynamics.g
+
+
+@compiled
+def _limit_damping(c, D_task):
+    """Give every joint the share of its dampers that its inertia takes beside a damping of the task, 1/s."""
+    state, params = c.state, c.params
+    joint_damping_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
+    state.joint_damping[:] = params.D_pose
+    if state.mode != FREE:
+        for i in range(state.joint_damping.shape[0]):
+            state.joint_damping[i] = max(params.D_pose[i], params.null_damping) + params.contact_damping
+    share_damping(state.joint_damping, state.damping_limit, state.damping_share)
+    for i in range(state.joint_damping.shape[0]):
+        state.joint_damping[i] *= state.damping_share[i]
+
+
+@compiled
+def _posture(c):
+    """Give what pulls to the posture and what damps it, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m."""
+    state, params = c.state, c.params
+    _follow_posture(state, params)
+    tau_spring = state.target.q_pose - c.measurement.q
+    shorten(tau_spring, params.posture_error_max_rad)
+    tau_damping = np.empty(tau_spring.shape[0])
+    for i in range(tau_spring.shape[0]):
+        D = state.damping_share[i] * params.D_pose[i]
+        tau_spring[i] *= state.posture_share * min(params.K_pose[i], D / (2.0 * params.loop_delay_s))
+        tau_damping[i] = -D * c.measurement.qd[i]
+    return tau_spring, tau_damping
 
 
 @compiled
@@ -205,7 +266,7 @@ def _follow_posture(state, params):
 
 
 @compiled
-def _contact_law(c, pull, damping, task_disturbance, removed, share):
+def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
@@ -215,8 +276,8 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
     state, params = c.state, c.params
     qd, direction, M_inv = c.measurement.qd, c.state.direction, c.dynamics.M_inv
     limit = _push_limit(c)
-    damping -= params.null_damping * matvec_t(removed, qd)
-    damping -= params.contact_damping * qd
+    damping -= params.null_damping * matvec_t(removed, state.damping_share * qd)
+    damping -= params.contact_damping * state.damping_share * qd
     compensation = -task_disturbance
     push = push_along(direction, M_inv, compensation)
     if push > limit:
@@ -233,7 +294,10 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
         tau += (push - limit) * direction
     if state.holding == 0:
         # After the bound, or the task would use up what the brake frees.
-        tau -= params.approach_damping * min(dot(direction, qd), 0.0) * direction
+        approach = min(dot(direction, qd), 0.0)
+        if approach < 0.0 and params.approach_damping > 0.0:
+            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - D_task)
+            tau -= min(params.approach_damping, most) * approach * direction
     return tau
 
 
@@ -253,12 +317,18 @@ def _finish(c, tau):
     q, qd = c.measurement.q, c.measurement.qd
     tau -= dynamics.g + dynamics.c
     speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
+    n = tau.shape[0]
+    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
+    joint_stop_gains(
+        dynamics.M, params.joint_brake, params.joint_stop_stiffness, state.joint_damping, state.damping_limit,
+        params.loop_delay_s, brake, spring, drag,
+    )  # fmt: skip
     joint_stop_torque(
-        tau, q, qd, dynamics.M, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
-        params.joint_stop_stiffness, params.joint_deceleration, params.joint_brake,
+        tau, dynamics.M_inv, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
+        params.joint_deceleration, brake, spring, drag,
     )  # fmt: skip
     tau += dynamics.c
-    power_limit(tau, qd, state.tank_j, params.tank_power_w, params.tank_s)
+    power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s)
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
