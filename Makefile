@@ -13,7 +13,7 @@ PINS := pyproject.toml constraints.txt
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo bench test check docs clean require-python
+.PHONY: help demo bench test portable check docs clean require-python
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -26,6 +26,9 @@ bench: $(VENV)/.ready  ## speed on this machine
 
 test: check  ## everything CI runs: check, then all tests (ARGS="-k name" passes options to pytest)
 	$(TEST_BIN)/python -m pytest $(ARGS)
+
+portable: $(TEST_VENV)/.ready  ## all tests as on another processor: no instructions beyond the first ones (ARGS as for test)
+	$(TEST_BIN)/python tools/portable.py $(TEST_BIN)/python -m pytest $(ARGS)
 
 check: $(TEST_VENV)/.ready  ## lint, format, types, direction of imports, documentation
 	$(TEST_BIN)/ruff check .

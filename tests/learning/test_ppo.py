@@ -211,11 +211,13 @@ def test_eyes_of_another_version_are_refused(vae, tmp_path):
 
 
 def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
-    """With the ink's place readable off the observation, a few thousand steps must pay."""
-    config = ppo_config(
-        vae, tmp_path / "run", num_envs=16, total_steps=12_288, rollout_steps=32, batch=128, epochs=6,
-        learning_rate=2e-3, net=(64, 64), target_kl=0.05,
-        discount=0.95, evaluate_episodes=16, scan=0.0, observes=("pose",),
-    )  # fmt: skip
-    results = train_policy(config, lambda n: SightedWiping(n, max_steps=40))
-    assert results["ink_removed_mean"] > 0.6
+    """With the ink's place readable off the observation, a few thousand steps must pay, over what one rollout does."""
+    removed = []
+    for steps in (512, 6144):
+        config = ppo_config(
+            vae, tmp_path / str(steps), num_envs=16, total_steps=steps, rollout_steps=32, batch=128, epochs=6,
+            learning_rate=2e-3, net=(64, 64), target_kl=0.05,
+            discount=0.95, evaluate_episodes=16, scan=0.0, observes=("pose",),
+        )  # fmt: skip
+        removed.append(train_policy(config, lambda n: SightedWiping(n, max_steps=40))["ink_removed_mean"])
+    assert removed[1] > removed[0] + 0.4
