@@ -2,9 +2,9 @@
 
     python tools/portable.py python -m pytest
 
-Compiled code, array libraries and the C library's mathematics choose instructions by the processor, and their results
-differ in the last bits. Here each is taken down to its lowest, and is seen to have gone there before the command starts.
-Out of reach are ONNX Runtime, which has no such switch, and what is built for one instruction set alone (MuJoCo, Pinocchio).
+Compiled code, array libraries and the C library's mathematics choose instructions by the processor, and what they give
+differs in the last bits. Here each is taken down to its lowest, and is seen to be there before the command starts. Out
+of reach: ONNX Runtime, which has no such switch, and what is built for one instruction set (MuJoCo, Pinocchio).
 """
 
 import hashlib
@@ -62,12 +62,13 @@ def lowest(native):
         "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(CACHE),
         "ATEN_CPU_CAPABILITY": "default", "OPENBLAS_CORETYPE": "Nehalem" if X86 else "ARMV8",
     }  # fmt: skip
-    expected = {"numba": "generic", "numpy": "", "torch": "DEFAULT", "openblas": settings["OPENBLAS_CORETYPE"]}
-    if native["numpy"]:  # a group that the processor lacks, or an unknown one, would be a warning
+    expected = {"numba": "generic", "numpy": "", "torch": "DEFAULT", "opencv": ""}
+    if native["numpy"]:  # a group of instructions that the processor lacks would be a warning
         settings["NPY_DISABLE_CPU_FEATURES"] = native["numpy"]
+    if native["openblas"]:
+        expected["openblas"] = settings["OPENBLAS_CORETYPE"]
     if native["opencv"]:
         settings["OPENCV_CPU_DISABLE"] = native["opencv"].replace(" ", ",")
-    expected["opencv"] = ""
     if X86:
         settings |= {"ONEDNN_MAX_CPU_ISA": "SSE41", "MKL_CBWR": "COMPATIBLE"}
         expected |= {"onednn": "Intel SSE4.1", "mkl": "COMPATIBLE"}
@@ -87,14 +88,14 @@ def main(command):
     if "GLIBC_TUNABLES" in settings and has_fma() and chosen["libm"] == native["libm"]:
         failed.append("libm")
     if failed:
-        sys.exit(f"{', '.join(failed)} did not go down to {[expected.get(library, 'other sines') for library in failed]}")
+        sys.exit(f"portable: {', '.join(failed)} did not go down; this would test the machine's own instructions")
     sys.stdout.flush()
     os.execvpe(command[0], command, {**os.environ, **settings})
 
 
 def has_fma():
-    """Tell whether the processor has the instructions that glibc's mathematics uses where it may."""
-    return " fma " in pathlib.Path("/proc/cpuinfo").read_text()
+    """Tell whether the processor has the instructions with which glibc's sines come out otherwise."""
+    return " fma " in pathlib.Path("/proc/cpuinfo").read_text(encoding="ascii")
 
 
 if __name__ == "__main__":

@@ -546,7 +546,7 @@ def test_export_does_not_overwrite_unasked_and_leaves_nothing_behind(bundle, tmp
 
 
 def test_another_processors_rounding_kept_a_run_from_leaving_its_bundle(bundle):
-    """A trained policy of 1.7e-5 between torch and ONNX Runtime was not written, and hours of training had no result."""
+    """A policy 1.7e-5 apart between torch and ONNX Runtime was not written: hours of training without a result."""
     _, layers, scaling = networks()
     module = DeployedPolicy(layers, scaling)
     examples = [torch.zeros(2, 6), torch.zeros(2, 128)]
