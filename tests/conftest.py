@@ -2,16 +2,9 @@
 
 import ctypes.util
 import os
-import pathlib
 
 import pytest
 from hypothesis import HealthCheck, settings
-
-# Processes that test side by side compile each for itself: numba's index of a cache is not made for two that write.
-worker = os.environ.get("PYTEST_XDIST_WORKER")
-if worker is not None:
-    caches = os.environ.get("NUMBA_CACHE_DIR") or pathlib.Path(__file__).parents[1] / "build" / "compiled"
-    os.environ["NUMBA_CACHE_DIR"] = str(pathlib.Path(caches) / worker)  # read when contactsafe is imported
 
 # The first call of a compiled function takes seconds, a busy machine is no fault of the code, and a failure must come
 # back on the next run.

@@ -25,7 +25,6 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core import caching
-from numba.core.registry import cpu_target
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
@@ -45,13 +44,8 @@ _HANDED_DOWN = "CONTACTSAFE_PRIVATE_CACHE"
 
 
 def _digest() -> str:
-    """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy, and the processor.
-
-    Numba tells processors apart within a folder as well, but its index is not made for two that write at once, as two
-    machines may that share a home.
-    """
-    target = cpu_target.target_context.codegen().magic_tuple()
-    fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {target}".encode())
+    """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy."""
+    fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
     root = pathlib.Path(__file__).parent
     for path in [root / "compiled.py", *(path for room in _ROOMS for path in sorted((root / room).rglob("*.py")))]:
         fingerprint.update(path.read_bytes())

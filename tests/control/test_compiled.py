@@ -48,13 +48,6 @@ def test_another_numba_changes_the_cache(copied_sources, monkeypatch):
     assert compiled._digest() != before
 
 
-def test_two_kinds_of_processor_under_one_home_shared_a_cache(copied_sources, monkeypatch):
-    before = compiled._digest()
-    codegen = type(compiled.cpu_target.target_context.codegen())
-    monkeypatch.setattr(codegen, "magic_tuple", lambda self: ("x86_64-unknown-linux-gnu", "another", ""))
-    assert compiled._digest() != before
-
-
 @pytest.fixture
 def private(tmp_path, monkeypatch):
     """No cache folder but those under tmp_path, and nothing said or handed down yet; gives where private ones go."""
