@@ -10,10 +10,12 @@ BIN := $(VENV)/bin
 TEST_BIN := $(TEST_VENV)/bin
 PIP_FLAGS := --quiet --disable-pip-version-check --no-input
 PINS := pyproject.toml constraints.txt
+# Two processes, a file of tests always whole in one of them: what its tests share is made once.
+PYTEST := $(TEST_BIN)/python -m pytest -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo bench test check docs clean require-python
+.PHONY: help demo bench test portable check docs clean require-python
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -25,7 +27,10 @@ bench: $(VENV)/.ready  ## speed on this machine
 	$(BIN)/contactsafe bench $(ARGS)
 
 test: check  ## everything CI runs: check, then all tests (ARGS="-k name" passes options to pytest)
-	$(TEST_BIN)/python -m pytest $(ARGS)
+	$(PYTEST) $(ARGS)
+
+portable: $(TEST_VENV)/.ready  ## all tests as on another processor: no instructions beyond the first ones (ARGS as for test)
+	$(TEST_BIN)/python tools/portable.py $(PYTEST) $(ARGS)
 
 check: $(TEST_VENV)/.ready  ## lint, format, types, direction of imports, documentation
 	$(TEST_BIN)/ruff check .

@@ -4,7 +4,7 @@ import re
 from dataclasses import fields
 
 import pytest
-from tests.docs import DOCS, program
+from tests.docs import DOCS, assert_prints, program
 
 from contactsafe import ControllerConfig
 from contactsafe.experiments.registry import ENTRIES
@@ -33,7 +33,7 @@ def test_the_table_lists_them_all():
 def test_figures_are_what_the_program_prints(findings, number, capsys):
     assert findings.main([number]) == 0
     printed = capsys.readouterr().out.splitlines()[1:]
-    assert [line.strip() for line in printed] == QUOTED[number].splitlines()
+    assert_prints("".join(f"{line.strip()}\n" for line in printed), QUOTED[number])
 
 
 def test_an_unknown_finding_is_refused(findings, capsys):

@@ -97,7 +97,7 @@ def test_acts_as_the_trained_networks_do(exported):
         latent = MaskEncoder(vae)(views)
         scaled = torch.from_numpy(scaling(seen, latent.numpy()))
         wanted = layers(scaled).clamp(-1, 1).numpy()
-    np.testing.assert_allclose(Policy(exported, H).act(seen), wanted, atol=1e-5)
+    np.testing.assert_allclose(Policy(exported, H).act(seen), wanted, atol=1e-4)
     assert (np.abs(wanted) == 1.0).any()
 
 
@@ -111,7 +111,7 @@ def test_one_or_many_the_same_again_and_clipped(exported):
     for i in range(5):
         one = policy.act({key: value[i] for key, value in seen.items()})
         assert one.shape == (18,)
-        np.testing.assert_allclose(one, actions[i], atol=1e-5)
+        np.testing.assert_allclose(one, actions[i], atol=1e-4)
     assert (policy.rate_hz, policy.action_repeat) == (60.0, 1)
 
 
@@ -545,6 +545,17 @@ def test_export_does_not_overwrite_unasked_and_leaves_nothing_behind(bundle, tmp
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bundle", "precious"]
 
 
+def test_another_processors_rounding_kept_a_run_from_leaving_its_bundle(bundle):
+    """A policy 1.7e-5 apart between torch and ONNX Runtime was not written: hours of training without a result."""
+    _, layers, scaling = networks()
+    module = DeployedPolicy(layers, scaling)
+    examples = [torch.zeros(2, 6), torch.zeros(2, 128)]
+    data = to_onnx(module, examples, ["state", "latent"], "action")
+    with torch.no_grad():
+        layers[-1].bias += 2e-5
+    compare(module, data, "policy", examples, ["state", "latent"])
+
+
 def test_a_model_that_computes_something_else_is_not_written(bundle):
     _, layers, scaling = networks()
     module = DeployedPolicy(layers, scaling)
@@ -553,6 +564,6 @@ def test_a_model_that_computes_something_else_is_not_written(bundle):
     with torch.no_grad():
         layers[-1].bias += 0.1
     with pytest.raises(
-        ContactSafeError, match=r"^policy differs from the trained network by .*, allowed 1e-05; not written$"
+        ContactSafeError, match=r"^policy differs from the trained network by .*, allowed 0.0001; not written$"
     ):
         compare(module, data, "policy", examples, ["state", "latent"])

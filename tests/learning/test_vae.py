@@ -145,7 +145,7 @@ def test_exported_encoder_is_the_trained_one(tmp_path):
     found = Perception(session, "tool", 0.64, 32, H)(masks[..., None], tools)
     with torch.no_grad():
         wanted = MaskEncoder(vae)(torch.from_numpy(data.masks(np.arange(6)))).numpy()
-    np.testing.assert_allclose(found, wanted, atol=1e-5)
+    np.testing.assert_allclose(found, wanted, atol=1e-4)
 
 
 def test_runs_are_not_mixed_up(tmp_path):

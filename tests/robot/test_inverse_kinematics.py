@@ -49,6 +49,10 @@ def test_trac_ik_answers_where_the_compiled_solver_gives_up(panda, kinematics, a
     monkeypatch.setattr(kinematics, "_reference", ik.trac_ik(panda, timeout_s=1.0))  # by the clock, and others work too
     monkeypatch.setattr(kinematics, "_seeds", [])
     monkeypatch.setattr(alone, "_seeds", [])
+    patient = ik.trac_ik(panda, timeout_s=1.0)  # on a busy machine its own 20 ms may pass without it
+    if patient is None:
+        pytest.skip("pytracik is not installed")
+    monkeypatch.setitem(vars(kinematics), "_reference", patient)
     rng = np.random.default_rng(8)
     poses = [panda.tool_pose(q) for q in rng.uniform(panda.q_min, panda.q_max, (100, panda.n))]
     hard = [pose for pose in poses if _found(alone, pose) is None]

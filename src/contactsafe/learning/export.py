@@ -22,8 +22,12 @@ from contactsafe.learning.checkpoints import write_json
 from contactsafe.learning.encoder import MaskEncoder
 from contactsafe.learning.perception import open_session
 
-TOLERANCE = 1e-5
-"""Largest difference between torch and ONNX Runtime that is let pass."""
+TOLERANCE = 1e-4
+"""Largest difference between torch and ONNX Runtime that is let pass.
+
+Single precision rounds to 2e-5 of an action in nets that training has made steep, by another rule on each processor;
+a model that was exported wrongly is off by 1e-2 and more.
+"""
 
 OPSET = 18
 
