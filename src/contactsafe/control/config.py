@@ -10,7 +10,8 @@ from contactsafe.errors import InvalidInputError
 
 _PER_JOINT = ("K_pose", "D_pose")
 _POSITIVE = (
-    "dt", "loop_delay_s", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n", "meet_s", "hold_s",
+    "dt", "loop_delay_s", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n",
+    "meet_s", "hold_s",
     "tank_s",
 )  # fmt: skip
 _SHARES = ("release_fraction", "joint_speed_fraction", "torque_rate_fraction")

@@ -26,7 +26,14 @@ from contactsafe.control.laws import (
     task_nullspace,
     tool_share,
 )
-from contactsafe.control.limits import coming_speed, joint_stop_gains, joint_stop_torque, limit_torque, passive_step, power_limit
+from contactsafe.control.limits import (
+    coming_speed,
+    joint_stop_gains,
+    joint_stop_torque,
+    limit_torque,
+    passive_step,
+    power_limit,
+)
 from contactsafe.control.records import FREE
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
@@ -67,10 +74,7 @@ def control_tick(c):
     supervise(c)
     weigh_links(c)
     _watch_speed(c)
-    if c.state.fault == _RUNAWAY:
-        tau = _brake(c)
-    else:
-        tau = _law(c, Lambda, J_bar)
+    tau = _brake(c) if c.state.fault == _RUNAWAY else _law(c, Lambda, J_bar)
     _finish(c, tau)
 
 
