@@ -185,9 +185,8 @@ def main() -> None:
             runs.append((seed, run(model, cs.presets.by_name(name), seed, sensor=seed % 2 == 0)))
             if runs[-1][1].runaway or not runs[-1][1].finite:
                 print(f"seed {seed}, {name}: {runs[-1][1]}", flush=True)
-    print(
-        f"{'':8s}{'arms':>6s}{'runaways':>10s}{'not finite':>12s}{'faults':>8s}{'speed, largest':>16s}{'energy, p99':>13s}"
-    )
+    heads = f"{'arms':>6s}{'runaways':>10s}{'not finite':>12s}{'faults':>8s}{'speed, largest':>16s}{'energy, p99':>13s}"
+    print(f"{'':8s}{heads}")
     for name, runs in results.items():
         only = [found for _, found in runs]
         print(
