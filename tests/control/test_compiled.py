@@ -265,18 +265,16 @@ def test_a_cache_that_can_only_be_read_is_read(tmp_path, monkeypatch, private, c
 
 def test_many_processes_that_start_at_once_share_one_cache(tmp_path):
     code = """
-import pathlib, sys
+import sys
 from contactsafe import compiled
-namespace = {}
-source = pathlib.Path(sys.argv[1])
-exec(compile(source.read_text(), str(source), "exec"), namespace)
-function = compiled.compiled(namespace["double"])
+sys.path.insert(0, sys.argv[1])
+import small  # by name: what one process kept, another finds its module by
+function = compiled.compiled(small.double)
 assert function(21) == 42 and function(0.5) == 1.0 and function(1j) == 2j
 """
-    source = tmp_path / "small.py"
-    source.write_text("def double(x):\n    return 2 * x\n")
+    (tmp_path / "small.py").write_text("def double(x):\n    return 2 * x\n")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    command = [sys.executable, "-c", code, str(source)]
+    command = [sys.executable, "-c", code, str(tmp_path)]
     started = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) for _ in range(3)]
     for process in started:
         _, told = process.communicate(timeout=120)
