@@ -1,23 +1,28 @@
 """No inertia is so light that the controller's dampers drive it."""
 
 import math
+from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+from benchmarks.random_arms import random_arm, run
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from contactsafe import Controller, Measurement, Target, robots
 from contactsafe.control.config import damping_rate
 from contactsafe.control.damping import (
     GAIN_MARGIN,
     braking_limit,
     joint_damping_limits,
     largest_damping,
+    loosen_limits,
     share_damping,
     task_damping_into,
 )
-from contactsafe.control.presets import safe
+from contactsafe.control.presets import PRESETS, safe
 
 DT = 0.001
 
@@ -60,9 +65,12 @@ def test_the_characteristic_equation_has_no_root_outside_below_the_limit(delay, 
 def test_joints_coupled_in_any_way_stay_within_the_rate(seed, n):
     M_inv, limits = random_inverse_inertia(np.random.default_rng(seed), n), np.empty(n)
     joint_damping_limits(M_inv, 300.0, limits)
-    root = np.sqrt(limits)
-    fastest = np.linalg.eigvalsh(root[:, None] * M_inv * root)[-1]
-    assert fastest <= 300.0 * (1.0 + 1e-9)
+    for _ in range(2):
+        root = np.sqrt(limits)
+        fastest = np.linalg.eigvalsh(root[:, None] * M_inv * root)[-1]
+        assert fastest <= 300.0 * (1.0 + 1e-9)
+        loosen_limits(M_inv, 300.0, limits)
+    assert fastest >= 300.0 * n**-0.125 * (1.0 - 1e-6)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 10))
@@ -73,14 +81,16 @@ def test_joints_that_are_not_coupled_may_have_all_of_it(seed, n):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 2, 4])
-def test_the_limit_is_within_a_factor_of_two_of_what_is_unstable(random_arms, panda, six_joint_arm, delay):
+def test_the_limit_is_within_a_factor_of_two_of_what_is_unstable(panda, six_joint_arm, delay):
     """All joints damped at once, on arms as they are; twice the bound is unstable."""
     rng = np.random.default_rng(1)
-    for arm in (panda, six_joint_arm, *random_arms):
+    drawn = [robots.from_mjcf(random_arm(rng, n).compile(), site="tip") for n in (6, 7) for _ in range(10)]
+    for arm in (panda, six_joint_arm, *drawn):
         q = rng.uniform(arm.q_min, arm.q_max)
         M_inv, limits = arm.dynamics(q, np.zeros(arm.n))["M_inv"], np.empty(arm.n)
         joint_damping_limits(M_inv, largest_damping(delay) / DT, limits)
-        assert still_moves(M_inv, 0.98 * limits, delay) < 1e-3
+        loosen_limits(M_inv, largest_damping(delay) / DT, limits)
+        assert still_moves(M_inv, 0.98 * limits, delay) < 10.0  # what is braked slowly is still on its way
         assert still_moves(M_inv, 2.0 * limits, delay) > 1e3
 
 
@@ -123,3 +133,69 @@ def test_the_dampers_of_a_panda_are_as_configured(panda):
     for _ in range(300):
         joint_damping_limits(panda.dynamics(rng.uniform(panda.q_min, panda.q_max), np.zeros(7))["M_inv"], rate, limits)
         assert (wanted <= 1.05 * limits).all()
+
+
+SCENE = Path(__file__).parents[2] / "examples" / "own_scene.xml"
+
+
+@pytest.mark.parametrize("rotors", [True, False], ids=["rotors", "no rotors"])
+def test_light_joints_were_flung_on_contact(rotors):
+    """The how-to's arm without rotors: a joint reached 282 rad/s, the tool missed by 196 mm, and no fault was told."""
+    text = SCENE.read_text(encoding="utf-8")
+    model = mujoco.MjModel.from_xml_string(text if rotors else text.replace(' armature="0.1"', ""))
+    arm, data = robots.from_mjcf(model, site="tip"), mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    at, controller = arm.bind(model), Controller(arm, safe())
+    controller.reset(data.qpos[at.qpos])
+    start = Target(arm.tool_pose(arm.home), np.array([150.0] * 3 + [450.0] * 3), posture=arm.home)
+    error, speed, force, met = 0.0, 0.0, [], False
+    for tick in range(2500):
+        left = np.array([0.0, 0.25, 0.0]) * min(tick / 1500, 1.0)
+        target = start._replace(pose=start.pose._replace(position=start.pose.position + left))
+        out = controller.step(Measurement(data.qpos[at.qpos], data.qvel[at.dof]), target)
+        data.ctrl[at.ctrl] = out.torque / at.gear
+        mujoco.mj_step(model, data, at.steps)
+        error, speed = max(error, np.linalg.norm(out.error[:3])), max(speed, np.abs(data.qvel[at.dof]).max())
+        force.append(data.sensor("box").data[0])
+        met = met or out.contact.in_contact
+    assert met
+    assert speed < 3.0
+    assert error < 0.1
+    assert np.mean(force[-300:]) < 10.0
+    assert out.fault == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_no_random_arm_runs_away_in_silence(seed):
+    """Held, pushed, released, swept into something and driven to its limits, under every preset."""
+    model = random_arm(np.random.default_rng(seed), 6 + seed % 2).compile()
+    for preset in PRESETS.values():
+        seen = run(model, preset(), seed, sensor=seed % 4 < 2)
+        assert seen.finite
+        assert not seen.runaway
+
+
+def test_a_joint_that_runs_away_is_a_fault_and_is_braked(panda):
+    """Something drives joint 1 beyond its speed limit for good: it is damped from then on, and the fault says why."""
+    controller = Controller(panda, safe())
+    controller.reset(panda.home)
+    hold = Target(panda.tool_pose(panda.home), np.full(6, 150.0), posture=panda.home)
+    qd = np.zeros(7)
+    qd[0] = 1.5 * panda.qd_max[0]
+    faults = [controller.step(Measurement(panda.home, qd, np.zeros(6)), hold).fault for _ in range(400)]
+    assert faults[0] == "none"
+    assert "runs away" in faults[-1]
+    out = controller.step(Measurement(panda.home, qd, np.zeros(6)), hold)
+    assert out.torque[0] < -20.0
+
+
+def test_a_joint_that_is_fast_for_a_moment_is_no_runaway(panda):
+    controller = Controller(panda, safe())
+    controller.reset(panda.home)
+    hold = Target(panda.tool_pose(panda.home), np.full(6, 150.0), posture=panda.home)
+    qd = np.zeros(7)
+    for k in range(300):
+        qd[0] = 1.2 * panda.qd_max[0] if k % 100 < 50 else 0.0
+        out = controller.step(Measurement(panda.home, qd, np.zeros(6)), hold)
+    assert "runs away" not in out.fault

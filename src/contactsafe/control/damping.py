@@ -7,7 +7,7 @@ below β m/dt and no further, β depending on the delay alone; `docs/concepts/da
 import math
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matvec_into, spd_inverse
+from contactsafe.robot.linalg import dot, matmul_into, matvec_into, spd_inverse
 from contactsafe.robot.stack import stack_matrix, stack_vector
 
 GAIN_MARGIN = 2.0
@@ -51,6 +51,34 @@ def joint_damping_limits(M_inv, rate, out):
         for j in range(n):
             s += abs(M_inv[i, j]) * w[j]
         out[i] = rate * w[i] / s
+
+
+@compiled
+def loosen_limits(M_inv, rate, limits):
+    """Raise limits of `joint_damping_limits` in place, all alike, by what the signs of M⁻¹ leave.
+
+    With S = D^½ M⁻¹ D^½ the largest eigenvalue of M⁻¹ D is at most (tr S⁸)^(1/8), which is
+    at most n^(1/8) times it.
+
+    Args:
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        rate: largest eigenvalue allowed, 1/s.
+        limits: D, (n,), N m s/rad; updated.
+    """
+    n = limits.shape[0]
+    S, S2 = stack_matrix(n, n), stack_matrix(n, n)
+    for i in range(n):
+        for j in range(n):
+            S[i, j] = M_inv[i, j] * math.sqrt(limits[i] * limits[j]) / rate
+    matmul_into(S, S, S2)
+    matmul_into(S2, S2, S)
+    total = 0.0
+    for i in range(n):
+        total += dot(S[i], S[i])
+    largest = total**0.125
+    if largest < 1.0:
+        for i in range(n):
+            limits[i] /= largest
 
 
 @compiled

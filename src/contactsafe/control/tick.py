@@ -5,7 +5,13 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.control.damping import braking_limit, joint_damping_limits, share_damping, task_damping_into
+from contactsafe.control.damping import (
+    braking_limit,
+    joint_damping_limits,
+    loosen_limits,
+    share_damping,
+    task_damping_into,
+)
 from contactsafe.control.estimate import (
     LOST_AFTER_TICKS,
     correct_gravity,
@@ -222,6 +228,8 @@ def _limit_damping(c, D_task):
     if state.mode != FREE:
         for i in range(state.joint_damping.shape[0]):
             state.joint_damping[i] = max(params.D_pose[i], params.null_damping) + params.contact_damping
+    if (state.joint_damping > state.damping_limit).any():
+        loosen_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
     share_damping(state.joint_damping, state.damping_limit, state.damping_share)
     for i in range(state.joint_damping.shape[0]):
         state.joint_damping[i] *= state.damping_share[i]
