@@ -185,6 +185,7 @@ def _commanded(n: int) -> list[tuple]:
         ("K_task", _f, (6,)),  # in force, 1/s²
         ("D_task", _f, (6,)),  # in force, 1/s
         ("tank_j", _f),  # energy that the command may still give, J
+        ("task_damping", _f),  # largest of the task's damping in force, 1/s
         ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
         ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
         ("damping_share", _f, (n,)),  # of each joint's damping in force

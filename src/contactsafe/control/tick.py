@@ -34,6 +34,7 @@ from contactsafe.control.laws import (
 )
 from contactsafe.control.limits import (
     coming_speed,
+    joint_excess,
     joint_stop_gains,
     joint_stop_torque,
     limit_torque,
@@ -174,6 +175,7 @@ def _watch_speed(c):
 def _brake(c):
     """Damp all joints as much as they take, and carry the arm's weight: what is left to do when the arm runs away."""
     state, dynamics = c.state, c.dynamics
+    state.task_damping = 0.0
     joint_damping_limits(dynamics.M_inv, c.params.damping_rate, state.damping_limit)
     state.joint_damping[:] = state.damping_limit
     return dynamics.c + dynamics.g - state.damping_limit * c.measurement.qd
@@ -215,7 +217,7 @@ def _law(c, Lambda, J_bar):
         tau = state.task_share * pull + damping + state.unweighed
     else:
         disturbance = matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque))
-        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, D_task.max())
+        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share)
     return tau + dynamics.c + dynamics.g
 
 
@@ -223,6 +225,7 @@ def _law(c, Lambda, J_bar):
 def _limit_damping(c, D_task):
     """Give every joint the share of its dampers that its inertia takes beside a damping of the task, 1/s."""
     state, params = c.state, c.params
+    state.task_damping = D_task
     joint_damping_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
     state.joint_damping[:] = params.D_pose
     if state.mode != FREE:
@@ -278,7 +281,7 @@ def _follow_posture(state, params):
 
 
 @compiled
-def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
+def _contact_law(c, pull, damping, task_disturbance, removed, share):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
@@ -308,7 +311,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
         # After the bound, or the task would use up what the brake frees.
         approach = min(dot(direction, qd), 0.0)
         if approach < 0.0 and params.approach_damping > 0.0:
-            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - D_task)
+            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - state.task_damping)
             tau -= min(params.approach_damping, most) * approach * direction
     return tau
 
@@ -323,32 +326,54 @@ def _push_limit(c):
 
 
 @compiled
+def _refuse_unusable(state, tau):
+    """Repeat the last command where a law gave none that is finite."""
+    if not _all_usable(tau):
+        _latch(state, _NO_TORQUE)
+        tau[:] = state.tau
+
+
+@compiled
+def _stop_joints(c, tau_net):
+    """Keep joints in their range and below their speed limits, in place."""
+    state, dynamics, params = c.state, c.dynamics, c.params
+    q, qd = c.measurement.q, c.measurement.qd
+    n = q.shape[0]
+    excess, intrusion = stack_vector(n), stack_vector(n)
+    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
+    if not joint_excess(
+        q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
+        excess, intrusion,
+    ):  # fmt: skip
+        return
+    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
+    rate = params.braking_rate - state.task_damping
+    joint_stop_gains(
+        dynamics.M, state.joint_damping, rate, excess, intrusion, params.joint_brake,
+        params.joint_stop_stiffness, params.loop_delay_s, brake, spring, drag,
+    )  # fmt: skip
+    joint_stop_torque(tau_net, dynamics.M_inv, qd, excess, intrusion, params.joint_margin, brake, spring, drag)
+
+
+@compiled
 def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
-    q, qd = c.measurement.q, c.measurement.qd
+    qd = c.measurement.qd
+    _refuse_unusable(state, tau)
+    # What joints are stopped from is what the motors will do, not what was wanted of them.
+    clipped = limit_torque(tau, state.tau, params.tau_max, params.torque_step)
     tau -= dynamics.g + dynamics.c
-    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
-    n = tau.shape[0]
-    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
-    joint_stop_gains(
-        dynamics.M, params.joint_brake, params.joint_stop_stiffness, state.joint_damping, state.damping_limit,
-        params.loop_delay_s, brake, spring, drag,
-    )  # fmt: skip
-    joint_stop_torque(
-        tau, dynamics.M_inv, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
-        params.joint_deceleration, brake, spring, drag,
-    )  # fmt: skip
+    _stop_joints(c, tau)
     tau += dynamics.c
     power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s)
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
         tau += joint_friction_into(params.friction, qd, state.friction)
-    if not _all_usable(tau):
-        _latch(state, _NO_TORQUE)
-        tau[:] = state.tau
-    out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
+    _refuse_unusable(state, tau)
+    clipped = limit_torque(tau, state.tau, params.tau_max, params.torque_step) or clipped
+    out.limited = 1 if clipped else 0
     state.tau[:] = tau
     given = dot(tau - state.friction - dynamics.g, qd)
     state.tank_j = min(state.tank_j + params.dt * (params.tank_power_w - given), params.tank_j)
