@@ -344,7 +344,8 @@ def _stop_joints(c, tau_net):
     q, qd = state.q, state.qd
     n = q.shape[0]
     excess, intrusion = stack_vector(n), stack_vector(n)
-    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, max(state.step.dt, params.dt))
+    dt = max(state.step.dt, params.dt)
+    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt)
     if not joint_excess(
         q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
         excess, intrusion,
