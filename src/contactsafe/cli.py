@@ -90,6 +90,7 @@ def experiment(
       collisions    random motions meet random obstacles anywhere on the arm.
       detection     how soon is a contact reported, where, how often falsely?
       hostile       a policy asks for the impossible: are all limits kept?
+      clock         ticks late, measurements lost, frozen or impossible, no policy.
 
     The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
     of any batch once more and draws it.

@@ -265,7 +265,7 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda decorated: compiled(decorated, **options)
-    dispatcher = numba.njit(function, **options)
+    dispatcher = numba.njit(function, error_model="numpy", **options)  # nothing in a tick raises, not x / 0 either
     if hasattr(dispatcher, "_cache"):  # it has none where NUMBA_DISABLE_JIT is set
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = CACHE_FOLDER

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, controller_at, reach
 
 from contactsafe import Measurement, presets
-from contactsafe.control.limits import coming_speed, joint_stop_gains, joint_stop_torque, limit_torque
+from contactsafe.control.damping import joint_damping_limits
+from contactsafe.control.limits import coming_speed, joint_excess, joint_stop_gains, joint_stop_torque, limit_torque
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
 torques = arrays(float, 3, elements=st.floats(-1e6, 1e6))
@@ -43,43 +44,67 @@ M = np.diag([0.8, 0.2])
 MARGIN, STIFFNESS, DECELERATION, BRAKE = 0.1, 200.0, 8.0, 50.0
 
 
-NONE, PLENTY, DELAY_S = np.zeros(2), np.full(2, 1e6), 0.002
+NONE, DELAY_S, PLENTY = np.zeros(2), 0.002, 1e6
+commands = st.floats(-100, 100)
 
 
-def gains(damping=NONE, limits=PLENTY, stiffness=STIFFNESS):
+def gains(excess, intrusion, inertia=M, damping=NONE, rate=PLENTY, stiffness=STIFFNESS):
     """Give brake, spring and drag of the joint stops."""
     brake, spring, drag = np.empty(2), np.empty(2), np.empty(2)
-    joint_stop_gains(M, BRAKE, stiffness, np.array(damping), np.array(limits), DELAY_S, brake, spring, drag)
+    joint_stop_gains(
+        np.array(inertia), np.array(damping), rate, excess, intrusion, BRAKE, stiffness, DELAY_S, brake, spring, drag
+    )
     return brake, spring, drag
 
 
-def stop(tau, q, qd, in_force=(0.0, 0.0)):
+def stop(tau, q, qd, in_force=(0.0, 0.0), inertia=M):
     """Give what a command becomes at the joint stops, with another one in force."""
-    out, qd = np.array(tau, dtype=float), np.array(qd, dtype=float)
-    speed, ahead = coming_speed(qd, np.linalg.inv(M), np.array(in_force), 1.0, 0.001)
-    joint_stop_torque(
-        out, np.linalg.inv(M), np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, *gains()
-    )
+    out, qd, M_inv = np.array(tau, dtype=float), np.array(qd, dtype=float), np.linalg.inv(inertia)
+    speed, ahead = coming_speed(qd, M_inv, np.array(in_force), 1.0, 0.001)
+    excess, intrusion = np.empty(2), np.empty(2)
+    some = joint_excess(np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, excess, intrusion)
+    assert some == (excess.any() or intrusion.any())
+    joint_stop_torque(out, M_inv, qd, excess, intrusion, MARGIN, *gains(excess, intrusion, inertia))
     return out
 
 
-@given(*[st.floats(0.0, 200.0)] * 2, *[st.floats(0.0, 1e3)] * 2, st.floats(1.0, 1e6))
-def test_joint_stops_stay_within_what_a_light_joint_takes(damping, more, limit, other, stiffness):
-    """Brake and what damps already never pass the limit; the spring's delay is made up for twice over."""
-    damping, limits = np.minimum([damping, more], [limit, other]), np.array([limit, other])
-    brake, spring, drag = gains(damping, limits, stiffness)
-    assert (damping + brake <= limits + 1e-9).all()
-    assert (brake <= BRAKE * np.diag(M) + 1e-12).all()
+@given(
+    st.lists(st.floats(0.0, 0.9), min_size=2, max_size=2),
+    st.lists(st.sampled_from([0.0, -0.05, 0.3]), min_size=2, max_size=2),
+    st.floats(1e-6, 10.0),
+    st.floats(0.0, 0.95),
+    st.floats(1.0, 1e6),
+)
+def test_joint_stops_stay_within_what_a_light_joint_takes(share, excess, light, coupled, stiffness):
+    """With what damps already they never pass the rate; the spring's delay is made up for twice over."""
+    off = coupled * np.sqrt(0.8 * light)
+    inertia = np.array([[0.8, off], [off, light]])
+    limits, excess = np.empty(2), np.array(excess)
+    joint_damping_limits(np.linalg.inv(inertia), 300.0, limits)
+    damping = np.array(share) * limits
+    brake, spring, drag = gains(excess, NONE, inertia, damping, 400.0, stiffness)
+    root = np.linalg.cholesky(np.linalg.inv(inertia))
+    assert np.linalg.eigvalsh(root.T @ np.diag(damping + brake) @ root)[-1] <= 400.0 * (1.0 + 1e-6)
+    assert (brake <= BRAKE * np.diag(inertia) + 1e-12).all()
+    assert (brake[excess == 0.0] == 0.0).all()
     assert (2.0 * DELAY_S * spring <= damping + brake + 1e-9).all()
     assert (spring <= stiffness).all()
     assert (2.0 * DELAY_S * spring <= damping + drag + 1e-9).all()
 
 
 def test_joint_stops_of_a_heavy_joint_are_as_configured():
-    brake, spring, drag = gains()
+    brake, spring, drag = gains(np.ones(2), NONE)
     assert_allclose(brake, BRAKE * np.diag(M))
     assert_allclose(spring, STIFFNESS)
     assert_allclose(drag, 2.0 * DELAY_S * STIFFNESS)
+
+
+@given(commands, commands)
+def test_a_joint_that_others_push_out_of_its_range_is_stopped(tau, other):
+    """What counts is the acceleration of the whole command: at the limit nothing accelerates the joint outwards."""
+    inertia = np.array([[0.8, 0.3], [0.3, 0.2]])
+    left = stop([tau, other], [1.9 + MARGIN, -2.0], [0.0, 0.0], inertia=inertia)
+    assert (np.linalg.solve(inertia, left))[0] <= 1e-9
 
 
 def allowed_speed(left):
@@ -87,7 +112,7 @@ def allowed_speed(left):
     return min(QD_MAX[0], np.sqrt(2.0 * DECELERATION * max(left, 0.0)))
 
 
-commands, speeds = st.floats(-100, 100), st.floats(-5, 5)
+speeds = st.floats(-5, 5)
 
 
 @given(commands, st.floats(-1.9, 1.9), st.floats(-1.0, 1.0))

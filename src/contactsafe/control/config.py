@@ -11,14 +11,13 @@ from contactsafe.errors import InvalidInputError
 _PER_JOINT = ("K_pose", "D_pose")
 _POSITIVE = (
     "dt", "loop_delay_s", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n",
-    "meet_s", "hold_s",
-    "tank_s",
+    "meet_s", "hold_s", "tank_s", "target_timeout_s",
 )  # fmt: skip
 _SHARES = ("release_fraction", "joint_speed_fraction", "torque_rate_fraction")
 _MAY_BE_INFINITE = (
     "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
     "push_yield_n", "push_hold_n", "push_tool_n", "pull_max_m_s2", "pull_max_rad_s2",
-    "posture_error_max_rad", "tank_j",
+    "posture_error_max_rad", "tank_j", "target_timeout_s",
 )  # fmt: skip
 
 
@@ -86,6 +85,7 @@ class ControllerConfig:
         torque_rate_fraction: share of the arm's torque-rate limit that is used.
         loop_delay_s: from the measurement of a velocity to the torque that answers it, beyond the tick itself, s:
             filters, transport, motors. Damping and stiffness are kept below what it makes unstable.
+        target_timeout_s: after so long without a new target the tool is brought to rest, s; inf for never.
         dt: tick, s.
     """
 
@@ -145,6 +145,7 @@ class ControllerConfig:
     tank_s: float = 0.1
     torque_rate_fraction: float = 0.999
     loop_delay_s: float = 0.002
+    target_timeout_s: float = 0.1
     dt: float = 0.001
 
     def __post_init__(self):

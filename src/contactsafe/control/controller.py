@@ -22,11 +22,14 @@ class Measurement(NamedTuple):
         qd: joint velocities, (n,), rad/s.
         wrench_ee: wrench of the environment on the end effector at the tool point, world axes, (6,), N and N m;
             None without a force sensor.
+        time: when it was measured, s, by any clock that only goes forward; None where it is not known: then a tick
+            counts as one tick of time, unless the joints went further than that.
     """
 
     q: np.ndarray
     qd: np.ndarray
     wrench_ee: np.ndarray | None = None
+    time: float | None = None
 
 
 class Target(NamedTuple):
@@ -72,7 +75,9 @@ class Output(NamedTuple):
         residual: estimated external joint torque the law compensates, (n,), N m.
         error: x_d − x, position and rotation vector, (6,), m and rad.
         limited: whether a torque or torque-rate limit clipped the command.
-        fault: 'none', or the first reason since reset why a number was refused.
+        fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
+        bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
+        target_late: whether no new target came for so long that the tool is brought to rest.
     """
 
     torque: np.ndarray
@@ -81,6 +86,8 @@ class Output(NamedTuple):
     error: np.ndarray
     limited: bool
     fault: str
+    bridged: int = 0
+    target_late: bool = False
 
 
 class Controller:
@@ -115,6 +122,7 @@ class Controller:
         self.record = self._records[index]
         self._measured = _views(self._records["measurement"], index)
         self._reported = _views(self._records["output"], index)
+        self._kept = _views(self._records["target"], index)["kept"]
         self.record["handle"] = self._nominal.handle
         fill_params(self.record["params"], config, arm)
         self._last_target: Target | None = None
@@ -150,10 +158,11 @@ class Controller:
         self._last_target = None
         self._is_reset = True
 
-    def step(self, measurement: Measurement, target: Target) -> Output:
+    def step(self, measurement: Measurement, target: Target | None = None) -> Output:
         """Run one tick of 1 ms.
 
-        A target that is the very object of the last call is not checked again.
+        A target that is the very object of the last call is not checked again. None says that no new one came: the
+        last one holds, for `target_timeout_s` at most.
 
         Raises:
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
@@ -163,7 +172,8 @@ class Controller:
             raise InvalidInputError(
                 "the controller was not reset; call reset(q) with the measured joint positions first"
             )
-        if target is not self._last_target:
+        self._kept[...] = target is None
+        if target is not None and target is not self._last_target:
             self.set_target(target)
         self._set_measurement(measurement)
         tick_at(self._records, self._index)
@@ -204,6 +214,9 @@ class Controller:
         seen["has_wrench"][...] = measurement.wrench_ee is not None
         if measurement.wrench_ee is not None:
             seen["wrench_ee"][:] = _shaped(measurement.wrench_ee, 6, "wrench_ee")
+        seen["has_time"][...] = measurement.time is not None
+        if measurement.time is not None:
+            seen["time"][...] = _seconds(measurement.time)
 
     def _output(self) -> Output:
         out = self._reported
@@ -220,6 +233,8 @@ class Controller:
             error=out["error"].copy(),
             limited=bool(out["limited"]),
             fault=FAULTS[int(out["fault"])],
+            bridged=int(out["bridged"]),
+            target_late=bool(out["target_late"]),
         )
 
 
@@ -236,6 +251,13 @@ def _shaped(value, n: int, name: str) -> np.ndarray:
     if array.shape != (n,):
         raise InvalidInputError(f"{name} has shape {array.shape}; give {n} numbers")
     return array
+
+
+def _seconds(value) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"time is {type(value).__name__}, not a number; give seconds") from None
 
 
 def unit_quaternion(value, name: str) -> np.ndarray:

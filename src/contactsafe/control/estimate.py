@@ -8,15 +8,13 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.control.clock import BRIDGE_TICKS
 from contactsafe.control.laws import momentum_into, observer_step, passes_elsewhere, weigh
 from contactsafe.control.records import FREE
 from contactsafe.robot.dynamics import mass_regressor
 from contactsafe.robot.friction import joint_friction_into
 from contactsafe.robot.linalg import dot, matvec_into, matvec_t_into
 from contactsafe.robot.stack import stack_vector
-
-LOST_AFTER_TICKS = 20
-"""Unusable measurements in a row after which nothing is known of the torque meanwhile."""
 
 _SIGMAS = 3.0
 """A contact is what exceeds this many standard deviations of the weight that is not known yet."""
@@ -28,10 +26,13 @@ _NOISE_NM = 0.15
 _FORGET_S = 8.0
 _SETTLE_TICKS = 40
 
+_GAP = 0.3
+"""Share of the time between two measurements in which the tool's wrench was not measured that counts as a gap."""
+
 
 @compiled
 def start(c):
-    """Begin at rest: momentum as measured, command at gravity, so that nothing jumps; the links weigh what is said."""
+    """Begin where the arm is: momentum as measured, command as last sent; the links weigh what is said."""
     state, dynamics, params = c.state, c.dynamics, c.params
     state.started = 1
     state.task_share, state.posture_share = 1.0, 1.0
@@ -42,11 +43,12 @@ def start(c):
         state.mass_covariance[j, j] = params.mass_variance[j]
     for i in range(state.gravity_sigma.shape[0]):
         state.gravity_sigma[i] = _gravity_sigma(c, i)
-    momentum_into(dynamics.M, c.measurement.qd, state.momentum)
+    momentum_into(dynamics.M, state.qd, state.momentum)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
-        # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
-        state.tau[i] = state.beta[i]
+        # What the torque last sent did is not known: all of it that the arm did not need is put down to friction this
+        # once, so that the first raw external torque is zero.
+        state.friction[i] = state.tau[i] - state.beta[i]
         state.tau_before[i] = state.tau[i]
 
 
@@ -61,7 +63,7 @@ def correct_gravity(c):
     if not c.params.mass_variance.any():
         return
     mass_regressor(c.handle, c.dynamics.mass_regressor)
-    if c.measurement.has_wrench != 0:
+    if c.state.has_wrench != 0:
         c.dynamics.mass_regressor[:, -1] = 0.0  # the tool's own weight shows in the wrench and cancels
     heavier = matvec_into(c.dynamics.mass_regressor, state.mass_error, stack_vector(state.unweighed.shape[0]))
     for i in range(heavier.shape[0]):
@@ -71,39 +73,66 @@ def correct_gravity(c):
 
 @compiled
 def observe(c):
-    """Raw external torque of the last tick, two observers of it, a low-pass behind each; (10)-(14).
+    """Raw external torque since the last good measurement, two observers of it, a low-pass behind each; (10)-(14).
 
-    After unusable measurements it is the mean since the last good one, during which the torque was repeated.
+    It is a mean over the time that passed, in which what was commanded is known tick by tick.
     """
-    state, dynamics, params = c.state, c.dynamics, c.params
+    state, dynamics, params, step = c.state, c.dynamics, c.params, c.state.step
     n = state.tau.shape[0]
-    since = params.dt * (1 + state.bad_ticks)
-    known = state.bad_ticks <= LOST_AFTER_TICKS
-    p = momentum_into(dynamics.M, c.measurement.qd, stack_vector(n))
-    tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
+    state.impulse_ticks += state.elapsed
     for i in range(n):
-        ramp[i] = state.tau[i] - state.tau_before[i]
-        state.tau_before[i] = state.tau[i]
         beta = dynamics.g[i] - dynamics.CT_qd[i]
         applied = state.tau[i] - state.friction[i] - 0.5 * (beta + state.beta[i])
-        rate[i] = (p[i] - state.momentum[i]) / since
-        tau_external[i] = rate[i] - applied
+        state.impulse[i] += state.elapsed * applied
         state.beta[i] = beta
-        state.momentum[i] = p[i]
-    if not known:
+    if state.bridged > 0:
         return
-    if c.measurement.has_wrench != 0 and params.cancel_tool_wrench != 0:
-        matvec_t_into(dynamics.J, c.measurement.wrench_ee, tau_tool)
-        for i in range(n):
-            tau_external[i] -= tau_tool[i]
-    observer_step(state.observed, params.observer_share, tau_external)
-    observer_step(state.observed_trigger, params.trigger_share, tau_external)
-    observer_step(state.observed_rate, params.trigger_share, rate)
-    observer_step(state.observed_ramp, params.trigger_share, ramp)
-    observer_step(state.residual, params.lowpass_share, state.observed)
-    observer_step(state.residual_trigger, params.lowpass_share, state.observed_trigger)
-    observer_step(state.momentum_rate, params.lowpass_share, state.observed_rate)
-    observer_step(state.torque_ramp, params.lowpass_share, state.observed_ramp)
+    p = momentum_into(dynamics.M, state.qd, stack_vector(n))
+    tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
+    for i in range(n):
+        ramp[i] = (state.tau[i] - state.tau_before[i]) / state.since
+        rate[i] = (p[i] - state.momentum[i]) / (state.since * params.dt)
+        tau_external[i] = rate[i] - state.impulse[i] / state.impulse_ticks
+        state.tau_before[i], state.momentum[i], state.impulse[i] = state.tau[i], p[i], 0.0
+    state.impulse_ticks = 0.0
+    _tool_torque(c, tau_tool)
+    if state.since > BRIDGE_TICKS + 1.5 or state.unclear != 0:
+        return
+    for i in range(n):
+        tau_external[i] -= tau_tool[i]
+    observer_step(state.observed, step.observer_share, tau_external)
+    observer_step(state.observed_trigger, step.trigger_share, tau_external)
+    observer_step(state.observed_rate, step.trigger_share, rate)
+    observer_step(state.observed_ramp, step.trigger_share, ramp)
+    observer_step(state.residual, step.lowpass_share, state.observed)
+    observer_step(state.residual_trigger, step.lowpass_share, state.observed_trigger)
+    observer_step(state.momentum_rate, step.lowpass_share, state.observed_rate)
+    observer_step(state.torque_ramp, step.lowpass_share, state.observed_ramp)
+
+
+@compiled
+def _tool_torque(c, out):
+    """Fill the measured tool wrench as joint torque, (n,), N m: of the last tick, and of those before it by its mean.
+
+    What the tool felt in a gap nobody knows; it may be all that it felt of late. That is `unseen`, and dies out as it
+    does in the observers.
+    """
+    state, J, step = c.state, c.dynamics.J, c.state.step
+    out[:] = 0.0
+    if state.has_wrench == 0 or c.params.cancel_tool_wrench == 0:
+        return
+    matvec_t_into(J, state.wrench_ee, out)
+    fade = 1.0 - 0.4 * min(step.trigger_share, step.lowpass_share)
+    for i in range(out.shape[0]):
+        state.felt[i] = max(abs(out[i]), (1.0 - step.tool_share) * state.felt[i])
+        state.unseen[i] *= fade
+    gap = 1.0 - 1.0 / state.since
+    if gap > _GAP:
+        before = matvec_t_into(J, state.wrench_before, stack_vector(out.shape[0]))
+        for i in range(out.shape[0]):
+            state.unseen[i] = max(state.unseen[i], 1.2 * gap * state.felt[i])
+            out[i] += 0.5 * gap * (before[i] - out[i])
+    state.wrench_before[:] = state.wrench_ee
 
 
 @compiled
@@ -118,7 +147,7 @@ def part_tool_from_arm(c, J_bar):
     state, J = c.state, c.dynamics.J
     n = state.tau.shape[0]
     state.alarm[:] = state.residual_trigger
-    if c.measurement.has_wrench != 0 or c.params.cancel_tool_wrench == 0 or n <= 6:
+    if c.state.has_wrench != 0 or c.params.cancel_tool_wrench == 0 or n <= 6:
         state.arm_torque[:] = state.residual
         state.arm_torque_trigger[:] = state.residual_trigger
         return
@@ -127,7 +156,7 @@ def part_tool_from_arm(c, J_bar):
     if not passes_elsewhere(wrench, c.params.tool_radius_m, c.params.tool_moment_nm):
         state.alarm -= matvec_t_into(J, wrench, tau_tool)
     if state.mode == FREE:
-        observer_step(state.tool_wrench, c.params.tool_share, wrench)
+        observer_step(state.tool_wrench, state.step.tool_share, wrench)
     matvec_t_into(J, state.tool_wrench, tau_tool)
     for i in range(n):
         state.arm_torque[i] = state.residual[i] - tau_tool[i]
@@ -139,14 +168,14 @@ def set_thresholds(c):
     """Give each joint the threshold that what is not known of the arm asks for.
 
     δ plus a share of friction and of inertial torque, whose model is not exact, plus what a late command is short of,
-    plus the standard deviation of the gravity torque that is left after weighing.
+    what the tool may have felt unseen, and the standard deviation of the gravity torque that is left after weighing.
     """
     state, params = c.state, c.params
-    friction = joint_friction_into(params.friction, c.measurement.qd, stack_vector(state.threshold.shape[0]))
+    friction = joint_friction_into(params.friction, c.state.qd, stack_vector(state.threshold.shape[0]))
     for i in range(state.threshold.shape[0]):
         inertial = abs(state.momentum_rate[i]) + abs(c.dynamics.CT_qd[i])
         unknown = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
-        unknown += params.delay_uncertainty_ticks * abs(state.torque_ramp[i])
+        unknown += params.delay_uncertainty_ticks * abs(state.torque_ramp[i]) + state.unseen[i]
         state.unknown[i] = unknown
         state.threshold[i] = params.residual_threshold + unknown + _SIGMAS * state.gravity_sigma[i]
 
@@ -166,9 +195,9 @@ def weigh_links(c):
     state.turn = (i + 1) % n
     row = dynamics.mass_regressor[i]
     for j in range(row.shape[0]):
-        forgotten = state.mass_covariance[j, j] + params.mass_variance[j] * params.dt / _FORGET_S
+        forgotten = state.mass_covariance[j, j] + params.mass_variance[j] * state.step.dt / _FORGET_S
         state.mass_covariance[j, j] = min(forgotten, params.mass_variance[j])
-    told = c.measurement.has_wrench != 0
+    told = c.state.has_wrench != 0
     state.ticks += 1
     if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
         error = _NOISE_NM + state.unknown[i]

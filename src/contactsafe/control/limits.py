@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matvec, matvec_into
-from contactsafe.robot.stack import stack_vector
+from contactsafe.control.damping import joint_damping_limits
+from contactsafe.robot.linalg import dot, matvec, matvec_into, spd_inverse
+from contactsafe.robot.stack import stack_matrix, stack_vector
 
 _STILL = 1e-12
 """Twice the energy of an arm that stands still, J: no torque gives it any power worth the name."""
@@ -84,41 +85,13 @@ def coming_speed(qd, M_inv, momentum_rate, step_max, dt):
 
 
 @compiled
-def joint_stop_gains(M, gain, stiffness, damping, limits, delay_s, brake, spring, drag):
-    """Fill what the joint stops may brake and push back with, kept within what each joint takes (`control.damping`).
-
-    Args:
-        M: joint inertia, (n, n), kg m².
-        gain: braking per excess of speed, 1/s.
-        stiffness: N m/rad of intrusion.
-        damping: that acts on each joint already, (n,), N m s/rad.
-        limits: what all of it may come to, (n,), N m s/rad.
-        delay_s: of the loop, s.
-        brake: (n,), N m s/rad; filled: in proportion to the inertia that the joint moves.
-        spring: (n,), N m/rad; filled: no more than lets damping make up twice for its delay.
-        drag: (n,), N m s/rad; filled: that damping, where the brake does not act.
-    """
-    for i in range(brake.shape[0]):
-        brake[i] = min(gain * M[i, i], max(limits[i] - damping[i], 0.0))
-        spring[i] = min(stiffness, (damping[i] + brake[i]) / (2.0 * delay_s))
-        drag[i] = min(2.0 * delay_s * spring[i], brake[i])
-
-
-@compiled
-def joint_stop_torque(
-    tau_net, M_inv, q, qd, speed, ahead, q_min, q_max, qd_max, margin, deceleration, brake, spring, drag
-):  # fmt: skip
-    """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
+def joint_excess(q, qd, speed, ahead, q_min, q_max, qd_max, margin, deceleration, excess, intrusion):
+    """Fill by how much each joint is too fast and too far, signed by its direction; tell whether any is.
 
     A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
-    what counts is the speed that it will have before the torque that drives it can be taken off. What is faster is
-    braked, and what pushes it on fades; within the margin a spring pushes back, damped on the way out as well.
-    What pushes a joint on is the acceleration that the whole command gives it, as a torque of its own,
-    (M⁻¹ τ)_i/(M⁻¹)_ii: on a chain of parallel axes its own torque may hold it against all the others'.
+    what counts is the speed that it will have before the torque that drives it can be taken off.
 
     Args:
-        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
-        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
         q, qd: (n,), rad and rad/s.
         speed: by then, (n,), rad/s; see `coming_speed`.
         ahead: time until then, (n,), s.
@@ -126,26 +99,88 @@ def joint_stop_torque(
         qd_max: speed limits, (n,), rad/s.
         margin: rad.
         deceleration: a, rad/s².
+        excess: (n,), rad/s; filled: positive where it moves up.
+        intrusion: into the margin, (n,), rad; filled: positive at the upper end.
+    """
+    some = False
+    for i in range(q.shape[0]):
+        way = 1.0 if speed[i] > 0.0 else -1.0
+        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin - max(way * qd[i], 0.0) * ahead[i]
+        allowed = min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
+        excess[i] = way * max(way * speed[i] - allowed, 0.0)
+        intrusion[i] = max(q[i] - q_max[i] + margin, 0.0)
+        if intrusion[i] == 0.0:
+            intrusion[i] = min(q[i] - q_min[i] - margin, 0.0)
+        some = some or excess[i] != 0.0 or intrusion[i] != 0.0
+    return some
+
+
+@compiled
+def joint_stop_gains(M, damping, rate, excess, intrusion, gain, stiffness, delay_s, brake, spring, drag):
+    """Fill what the joint stops may brake and push back with, kept within what those joints take (`control.damping`).
+
+    Args:
+        M: joint inertia, (n, n), kg m².
+        damping: that acts on each joint already, (n,), N m s/rad.
+        rate: largest eigenvalue allowed of all of it, 1/s.
+        excess, intrusion: of `joint_excess`, (n,); joints without either get nothing.
+        gain: braking per excess of speed, 1/s.
+        stiffness: N m/rad of intrusion.
+        delay_s: of the loop, s.
+        brake: (n,), N m s/rad; filled: in proportion to the inertia that the joint moves.
+        spring: (n,), N m/rad; filled: no more than lets damping make up twice for its delay.
+        drag: (n,), N m s/rad; filled: that damping, where the brake does not act.
+    """
+    n = brake.shape[0]
+    left, left_inv, most = stack_matrix(n, n), stack_matrix(n, n), stack_vector(n)
+    for i in range(n):
+        for j in range(n):
+            left[i, j] = rate * M[i, j]
+        left[i, i] -= damping[i]
+    if not spd_inverse(left, left_inv):
+        left_inv[:] = 0.0
+    for i in range(n):
+        if excess[i] == 0.0 and intrusion[i] == 0.0:
+            left_inv[i, :], left_inv[:, i] = 0.0, 0.0
+            left_inv[i, i] = 1.0
+    joint_damping_limits(left_inv, 1.0, most)
+    for i in range(n):
+        stopped = excess[i] != 0.0 or intrusion[i] != 0.0
+        brake[i] = min(gain * M[i, i], most[i]) if stopped else 0.0
+        spring[i] = min(stiffness, (damping[i] + brake[i]) / (2.0 * delay_s)) if stopped else 0.0
+        drag[i] = min(2.0 * delay_s * spring[i], brake[i])
+
+
+@compiled
+def joint_stop_torque(tau_net, M_inv, qd, excess, intrusion, margin, brake, spring, drag):
+    """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
+
+    What is too fast is braked, and what pushes it on fades; within the margin a spring pushes back, damped on the way
+    out as well. What pushes a joint on is the acceleration that the whole command gives it, as a torque of its own,
+    (M⁻¹ τ)_i/(M⁻¹)_ii: on a chain of parallel axes its own torque may hold it against all the others'.
+
+    Args:
+        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        qd: (n,), rad/s.
+        excess, intrusion: of `joint_excess`, (n,), rad/s and rad.
+        margin: rad.
         brake: per excess of speed, (n,), N m s/rad.
         spring: per intrusion, (n,), N m/rad.
         drag: on the way out of the margin, (n,), N m s/rad.
     """
-    for i in range(q.shape[0]):
-        way = 1.0 if speed[i] > 0.0 else -1.0
-        left = (q_max[i] - q[i] if way > 0.0 else q[i] - q_min[i]) - margin - max(way * qd[i], 0.0) * ahead[i]
-        excess = way * speed[i] - min(qd_max[i], math.sqrt(2.0 * deceleration * max(left, 0.0)))
-        low, high = q_min[i] + margin - q[i], q[i] - q_max[i] + margin
-        if excess <= 0.0 and low <= 0.0 and high <= 0.0:
+    for i in range(qd.shape[0]):
+        if excess[i] == 0.0 and intrusion[i] == 0.0:
             continue
         push = dot(M_inv[i], tau_net) / M_inv[i, i]
         change = 0.0
-        if excess > 0.0:
-            change = -way * (max(way * push, 0.0) * min(excess / _FADE_RAD_S, 1.0) + brake[i] * excess)
-        push += change
-        if low > 0.0:
-            change += min(low / margin, 1.0) * max(-push, 0.0) + spring[i] * low - drag[i] * max(qd[i], 0.0)
-        elif high > 0.0:
-            change -= min(high / margin, 1.0) * max(push, 0.0) + spring[i] * high + drag[i] * min(qd[i], 0.0)
+        if excess[i] != 0.0:
+            way = 1.0 if excess[i] > 0.0 else -1.0
+            change = -way * max(way * push, 0.0) * min(way * excess[i] / _FADE_RAD_S, 1.0) - brake[i] * excess[i]
+        if intrusion[i] != 0.0:
+            out = 1.0 if intrusion[i] > 0.0 else -1.0
+            change -= out * max(out * (push + change), 0.0) * min(out * intrusion[i] / margin, 1.0)
+            change -= spring[i] * intrusion[i] + out * drag[i] * min(out * qd[i], 0.0)
         tau_net[i] += change
 
 

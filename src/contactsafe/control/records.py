@@ -24,17 +24,32 @@ UNKNOWN_SPEED_LIMIT = 4.0 * math.pi
 FREE, CONTACT = 0, 1
 """Modes of the supervisor."""
 
+_OUTSIDE_RAD = 0.5
+"""A joint measured further outside its range than this is not there: no stop gives way so far."""
+
+_TURNS_RAD = 1e4
+"""Joints that turn without end are believed to have turned so far."""
+
+_FASTER = 5.0
+"""Multiple of a joint's speed limit at which its measured speed is not believed."""
+
+MISSING, REPEATED, OVERDUE, UNTRUE = 5, 7, 8, 9
+"""Faults of measurements that last: no usable numbers, the same again, too late, in contradiction to those before."""
+
 FAULTS = {
     0: "none",
-    1: "measurement is not finite or absurdly large; the last torque was repeated",
+    1: "a measurement is not finite or beyond what the arm can do; it was bridged by a prediction",
     2: "target is not finite or absurdly large; the last good target holds",
     3: "target quaternion is not of unit length; the last good target holds",
     4: "target stiffness or damping is out of range; the last good target holds",
-    5: "measurements stayed unusable for 20 ticks; gravity compensation only",
+    5: "measurements stayed unusable for over 20 ticks; the arm was braked until reset",
     6: "the law gave no finite torque; the last torque was repeated",
+    7: "the measurement did not change for over 20 ticks of motion; the arm was braked until reset",
+    8: "over 20 ticks passed between two measurements; the arm was braked until reset",
+    9: "measurements contradicted each other, or went on elsewhere, for over 20 ticks; the arm was braked until reset",
     11: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
 }
-"""What `fault` in the state and output means; the first one is latched until reset, but 5 replaces it."""
+"""What `fault` in the state and output means; the first one is latched until reset, but 5 and 7 … 9 replace it."""
 
 
 def measurement_dtype(n: int) -> np.dtype:
@@ -45,6 +60,8 @@ def measurement_dtype(n: int) -> np.dtype:
             ("qd", _f, (n,)),  # rad/s
             ("wrench_ee", _f, (6,)),  # environment on end effector, at the tool point, world axes, N and N m
             ("has_wrench", _i),  # 0 where no force sensor is there
+            ("time", _f),  # when it was measured, s
+            ("has_time", _i),  # 0 where that is not known
         ]
     )
 
@@ -58,6 +75,7 @@ def target_dtype(n: int) -> np.dtype:
             ("K_task", _f, (6,)),  # 1/s²
             ("D_task", _f, (6,)),  # 1/s
             ("q_pose", _f, (n,)),  # rad
+            ("kept", _i),  # 1 in a tick for which no new one came
         ]
     )
 
@@ -101,6 +119,7 @@ def params_dtype(n: int) -> np.dtype:
         + [("dwell_ticks", _i), ("release_ticks", _i)]
         + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "qd_max", "tau_max")]
         + [("runaway_speed", _f, (n,)), ("reversal_s", _f, (n,))]
+        + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
         + [("friction", _f, (n, 3)), ("mass_variance", _f, (n + 1,))]
     )
 
@@ -113,7 +132,7 @@ def state_dtype(n: int) -> np.dtype:
             ("turn", _i),  # joint whose residual is weighed next
             ("ticks", _i),  # since reset
             ("fault", _i),  # first fault since reset
-            ("bad_ticks", _i),  # unusable measurements in a row
+            *_clocked(n),
             *_estimated(n),
             *_supervised(n),
             *_commanded(n),
@@ -121,11 +140,46 @@ def state_dtype(n: int) -> np.dtype:
     )
 
 
+step_dtype = np.dtype([("ticks", _f), ("dt", _f), *((name, _f) for name in _SHARES), ("torque_step", _f)])
+"""What a tick comes to when so many ticks of time passed in it: s, shares, N m."""
+
+
+def _clocked(n: int) -> list[tuple]:
+    """Where the arm is believed to be, and since when it was not seen."""
+    return [
+        ("q", _f, (n,)),  # as measured, or as predicted where that failed, rad
+        ("qd", _f, (n,)),  # rad/s
+        ("wrench_ee", _f, (6,)),  # last good one
+        ("has_wrench", _i),
+        ("q_good", _f, (n,)),  # last good measurement, rad
+        ("qd_good", _f, (n,)),  # rad/s
+        ("time", _f),  # of it, s
+        ("timed", _i),  # 0 where that is not known
+        ("pace", _f),  # ticks of time that a call usually comes to
+        ("pace_variance", _f),
+        ("elapsed", _f),  # ticks of time that passed since the last tick
+        ("since", _f),  # ticks of time between the last good measurement and the one before it, or now
+        ("unclear", _i),  # 1 where that time is not known for sure
+        ("bridged", _i),  # ticks in a row whose measurement was predicted
+        ("braking", _i),  # 1 once the arm is braked, until reset
+        ("rests", _i),  # 1 once it was braked to rest
+        ("q_hold", _f, (n,)),  # where, rad
+        ("step", step_dtype),
+        ("target_age", _f),  # ticks of time since a new target came
+        ("target_late", _i),  # 1 where that is too long ago
+    ]
+
+
 def _estimated(n: int) -> list[tuple]:
     """What acts on the arm and what its links weigh."""
     return [
         ("momentum", _f, (n,)),  # at the last tick, kg m²/s
+        ("wrench_before", _f, (6,)),  # at the last good measurement, on the tool, N and N m
+        ("felt", _f, (n,)),  # largest torque of the tool's wrench of late, N m
+        ("unseen", _f, (n,)),  # torque of the tool that a gap in the measurements may have hidden, N m
         ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
+        ("impulse", _f, (n,)),  # of the command less friction and β since the last good measurement, N m ticks
+        ("impulse_ticks", _f),  # in so many ticks
         ("observed", _f, (n,)),  # residual before its low-pass, compensating observer, N m
         ("observed_trigger", _f, (n,)),  # the same, triggering observer, N m
         ("residual", _f, (n,)),  # N m
@@ -185,6 +239,7 @@ def _commanded(n: int) -> list[tuple]:
         ("K_task", _f, (6,)),  # in force, 1/s²
         ("D_task", _f, (6,)),  # in force, 1/s
         ("tank_j", _f),  # energy that the command may still give, J
+        ("task_damping", _f),  # largest of the task's damping in force, 1/s
         ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
         ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
         ("damping_share", _f, (n,)),  # of each joint's damping in force
@@ -211,6 +266,8 @@ def output_dtype(n: int) -> np.dtype:
             ("push_nm", _f),  # commanded push along the contact before the bound, N m
             ("push_limit_nm", _f),  # the bound in force; inf where there is none
             ("limited", _i),  # 1 where torque or torque rate was clipped
+            ("bridged", _i),  # ticks in a row whose measurement was predicted
+            ("target_late", _i),  # 1 where no new target came for too long
             ("fault", _i),
         ]
     )
@@ -276,12 +333,23 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["D_pose"] = np.maximum(_per_joint(config.D_pose, arm.n), 2.0 * config.loop_delay_s * params["K_pose"])
     params["damping_rate"] = damping_rate(config, GAIN_MARGIN)
     params["braking_rate"] = damping_rate(config, BRAKING_MARGIN)
-    params["q_min"], params["q_max"] = arm.q_min, arm.q_max
+    # Where the stops of a narrow range would overlap, they begin later: half of it stays free.
+    narrower = np.maximum(config.joint_margin - 0.25 * (arm.q_max - arm.q_min), 0.0)
+    params["q_min"], params["q_max"] = arm.q_min - narrower, arm.q_max + narrower
     params["runaway_speed"] = np.where(np.isfinite(arm.qd_max), arm.qd_max, UNKNOWN_SPEED_LIMIT)
     params["qd_max"] = config.joint_speed_fraction * params["runaway_speed"]
     # From full drive to full braking, and the lag of what is measured.
     params["reversal_s"] = 2.0 * arm.tau_max / arm.torque_rate_max + 10.0 * config.loop_delay_s
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
+    params["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - _OUTSIDE_RAD
+    params["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + _OUTSIDE_RAD
+    params["qd_most"] = np.minimum(_FASTER * arm.qd_max, _speed_gained(arm))
+
+
+def _speed_gained(arm: Arm) -> np.ndarray:
+    """Give the speed that full torque gives each joint over one turn, √(4π tau_max (M⁻¹)ᵢᵢ), (n,), rad/s."""
+    M_inv = arm.dynamics(arm.home, np.zeros(arm.n))["M_inv"]
+    return np.minimum(np.sqrt(4.0 * math.pi * arm.tau_max * np.diag(M_inv)), 1e5)
 
 
 def share_per_tick(time_constant_s: float, dt: float) -> float:

@@ -38,8 +38,9 @@ def supervise(c):
     state, params = c.state, c.params
     link = _link_in_contact(state.alarm, state.threshold, 1.0)
     left = link if state.mode == FREE else _link_in_contact(state.alarm, state.threshold, params.release_fraction)
-    state.mode_ticks += 1
-    state.quiet_ticks = 0 if left != 0 else state.quiet_ticks + 1
+    ticks = max(round(state.step.ticks), 1)
+    state.mode_ticks += ticks
+    state.quiet_ticks = 0 if left != 0 else state.quiet_ticks + ticks
     if state.mode == FREE:
         if link != 0 and params.contact_aware != 0:
             _enter(state, CONTACT)
@@ -113,31 +114,31 @@ def _watch_push(c):
 
     Torque and velocity pass the same filters, or the torque's lag would look like a pusher.
     """
-    state, params = c.state, c.params
-    observer_step(state.velocity_observed, params.trigger_share, c.measurement.qd)
-    observer_step(state.velocity_seen, params.lowpass_share, state.velocity_observed)
+    state, params, step = c.state, c.params, c.state.step
+    observer_step(state.velocity_observed, step.trigger_share, state.qd)
+    observer_step(state.velocity_seen, step.lowpass_share, state.velocity_observed)
     if state.mode != CONTACT:
         return
     lever = state.lever
-    state.meet_n = min(state.meet_n, params.push_meet_n) * (1.0 - params.dt / params.meet_s)
-    state.moved_rad += params.dt * dot(state.direction, state.velocity_seen)
+    state.meet_n = min(state.meet_n, params.push_meet_n) * (1.0 - step.dt / params.meet_s)
+    state.moved_rad += step.dt * dot(state.direction, state.velocity_seen)
     torque = dot(state.direction, state.arm_torque_trigger)
-    state.torque_smooth_nm += params.probe_share * (torque - state.torque_smooth_nm)
-    state.moved_smooth_rad += params.probe_share * (state.moved_rad - state.moved_smooth_rad)
+    state.torque_smooth_nm += step.probe_share * (torque - state.torque_smooth_nm)
+    state.moved_smooth_rad += step.probe_share * (state.moved_rad - state.moved_smooth_rad)
     moved, torque = state.moved_smooth_rad, state.torque_smooth_nm
-    step = params.probe_m / lever
+    way = params.probe_m / lever
     if moved <= 0.0:  # the arm moves into it
         state.moved_rad, state.moved_smooth_rad, state.reference_nm = state.moved_rad - moved, 0.0, torque
-        state.judge_rad, moved = step, 0.0
-    state.judge_rad = min(state.judge_rad, moved + step)
+        state.judge_rad, moved = way, 0.0
+    state.judge_rad = min(state.judge_rad, moved + way)
     if moved >= state.judge_rad:
-        state.judge_rad = moved + step
+        state.judge_rad = moved + way
         if is_pushed(state.reference_nm - torque, moved, lever, params.pusher_stiffness):
             fallen = 0.5 * (1.0 + params.hold_margin) * torque
             if state.holding == 0 or state.hold_nm < fallen:  # it gave way because the bound had fallen
                 state.hold_s = max(2.0 * state.hold_s, params.hold_s)
             state.holding, state.hold_nm = 1, params.hold_margin * torque
-        elif state.holding == 0 or moved >= _CERTAIN * step:
+        elif state.holding == 0 or moved >= _CERTAIN * way:
             state.holding, state.hold_s, state.hold_nm, state.meet_n = 0, 0.0, 0.0, 0.0
     if state.holding != 0:
-        state.hold_nm *= 1.0 - params.dt / state.hold_s
+        state.hold_nm *= 1.0 - step.dt / state.hold_s

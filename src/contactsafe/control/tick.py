@@ -5,6 +5,15 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.control.clock import (
+    BRIDGE_TICKS,
+    all_usable,
+    is_usable,
+    receive,
+    set_step,
+    stop_late_target,
+    stop_torque,
+)
 from contactsafe.control.damping import (
     braking_limit,
     joint_damping_limits,
@@ -13,7 +22,6 @@ from contactsafe.control.damping import (
     task_damping_into,
 )
 from contactsafe.control.estimate import (
-    LOST_AFTER_TICKS,
     correct_gravity,
     observe,
     part_tool_from_arm,
@@ -34,53 +42,63 @@ from contactsafe.control.laws import (
 )
 from contactsafe.control.limits import (
     coming_speed,
+    joint_excess,
     joint_stop_gains,
     joint_stop_torque,
     limit_torque,
     passive_step,
     power_limit,
 )
-from contactsafe.control.records import FREE
+from contactsafe.control.records import FREE, MISSING
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
 from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
 from contactsafe.robot.stack import stack_vector
 
-_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _LOST, _NO_TORQUE = 1, 2, 3, 4, 5, 6
+_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _NO_TORQUE = 1, 2, 3, 4, 6
 _RUNAWAY = 11
-
-_ABSURD = 1e6
-"""No number of a measurement or target reaches this, in SI units: a broken sensor or a loop that has run away."""
 
 
 @compiled(nogil=True)
 def control_tick(c):
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
-    Order: refuse bad numbers, nominal dynamics, observer, supervisor, law, push bound, joint stops, energy, friction,
-    limits. Bad numbers never raise: the last good target or torque holds and `fault` says why.
+    Order: measurement and time, nominal dynamics, observer, supervisor, law, push bound, joint stops, energy, friction,
+    limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
     """
-    if not _measurement_is_usable(c.measurement):
-        _tick_without_measurement(c)
-        return
+    state, usable = c.state, is_usable(c)
+    if not usable:
+        _latch(state, _BAD_MEASUREMENT)
+        if state.started == 0:
+            _wait(c)
+            return
+    receive(c, usable)
     _accept_target(c)
-    update_dynamics(c.handle, c.measurement.q, c.measurement.qd, c.dynamics)
+    update_dynamics(c.handle, state.q, state.qd, c.dynamics)
     correct_gravity(c)
-    if c.state.started == 0:
+    if state.started == 0:
         start(c)
+    stop_late_target(c)
     Lambda, J_M_inv = task_inertia(
         c.dynamics.J, c.dynamics.M_inv, c.params.manipulability_floor, c.params.manipulability_damping
     )
     J_bar = matmul(J_M_inv.T, Lambda)
+    set_step(c, min(state.since, BRIDGE_TICKS + 1.0))
     observe(c)
-    c.state.bad_ticks = 0
-    set_thresholds(c)
-    part_tool_from_arm(c, J_bar)
-    supervise(c)
-    weigh_links(c)
-    _watch_speed(c)
-    tau = _brake(c) if c.state.fault == _RUNAWAY else _law(c, Lambda, J_bar)
+    if state.bridged == 0:
+        set_thresholds(c)
+        part_tool_from_arm(c, J_bar)
+        supervise(c)
+        weigh_links(c)
+        _watch_speed(c)
+        state.since = 0.0
+    set_step(c, state.elapsed)
+    tau = _law(c, Lambda, J_bar)
+    if state.fault == _RUNAWAY:
+        tau = _brake(c)
+    elif state.braking != 0:
+        tau = stop_torque(c) + c.dynamics.c + c.dynamics.g
     _finish(c, tau)
 
 
@@ -91,44 +109,29 @@ def tick_at(controllers, i):
 
 
 @compiled
-def _all_usable(x):
-    for i in range(x.shape[0]):
-        if not abs(x[i]) < _ABSURD:  # NaN as well
-            return False
-    return True
-
-
-@compiled
-def _measurement_is_usable(m):
-    wrench_ok = m.has_wrench == 0 or _all_usable(m.wrench_ee)
-    return wrench_ok and _all_usable(m.q) and _all_usable(m.qd)
-
-
-@compiled
 def _latch(state, fault):
     if state.fault == 0:
         state.fault = fault
 
 
 @compiled
-def _tick_without_measurement(c):
-    """Repeat the last torque, as the robot itself does for a lost packet; after 20 ticks fall back to gravity."""
+def _wait(c):
+    """Repeat the torque that reset found until the first usable measurement; after 20 ticks go over to gravity."""
     state = c.state
-    _latch(state, _BAD_MEASUREMENT)
-    state.bad_ticks += 1
-    if state.bad_ticks > LOST_AFTER_TICKS:
-        state.fault = _LOST
+    state.bridged += 1
+    if state.bridged > BRIDGE_TICKS:
+        state.fault, state.braking = MISSING, 1
         tau = c.dynamics.g.copy()
         limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step)
         state.tau[:] = tau
     c.output.torque[:] = state.tau
-    c.output.fault = state.fault
+    c.output.fault, c.output.bridged = state.fault, state.bridged
 
 
 @compiled
 def _target_fault(target, params):
-    usable = _all_usable(target.position) and _all_usable(target.quat) and _all_usable(target.q_pose)
-    if not (usable and _all_usable(target.K_task) and _all_usable(target.D_task)):
+    usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_pose)
+    if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
         return _BAD_TARGET
     if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
         return _BAD_QUATERNION
@@ -142,6 +145,8 @@ def _target_fault(target, params):
 @compiled
 def _accept_target(c):
     """Take the target over where it is sound; latch the reason where it is not."""
+    if c.target.kept != 0:
+        return
     fault = _target_fault(c.target, c.params)
     if fault != 0:
         _latch(c.state, fault)
@@ -161,11 +166,11 @@ def _watch_speed(c):
     """Latch a fault where a joint stays beyond its speed limit for longer than braking it takes."""
     state, params = c.state, c.params
     for i in range(state.overspeed_s.shape[0]):
-        excess = abs(c.measurement.qd[i]) - params.runaway_speed[i]
+        excess = abs(state.qd[i]) - params.runaway_speed[i]
         if excess <= 0.0:
             state.overspeed_s[i] = 0.0
             continue
-        state.overspeed_s[i] += params.dt
+        state.overspeed_s[i] += state.step.dt
         if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
             state.fault = _RUNAWAY
 
@@ -174,9 +179,10 @@ def _watch_speed(c):
 def _brake(c):
     """Damp all joints as much as they take, and carry the arm's weight: what is left to do when the arm runs away."""
     state, dynamics = c.state, c.dynamics
+    state.task_damping = 0.0
     joint_damping_limits(dynamics.M_inv, c.params.damping_rate, state.damping_limit)
     state.joint_damping[:] = state.damping_limit
-    return dynamics.c + dynamics.g - state.damping_limit * c.measurement.qd
+    return dynamics.c + dynamics.g - state.damping_limit * state.qd
 
 
 @compiled
@@ -192,7 +198,7 @@ def _law(c, Lambda, J_bar):
         state.D_task,
         target.K_task,
         target.D_task,
-        params.dt,
+        state.step.dt,
         params.damping_min,
         params.passive_gains != 0,
     )
@@ -207,7 +213,7 @@ def _law(c, Lambda, J_bar):
     tau_spring, tau_damping = _posture(c)
     pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, tau_spring)
     damping = matvec_t(dynamics.J, F_damping) + matvec_t(N_ct, tau_damping)
-    observer_step(state.tool_force, params.probe_share, _tool_force(c, J_bar))
+    observer_step(state.tool_force, state.step.probe_share, _tool_force(c, J_bar))
     share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
@@ -215,7 +221,7 @@ def _law(c, Lambda, J_bar):
         tau = state.task_share * pull + damping + state.unweighed
     else:
         disturbance = matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque))
-        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, D_task.max())
+        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share)
     return tau + dynamics.c + dynamics.g
 
 
@@ -223,6 +229,7 @@ def _law(c, Lambda, J_bar):
 def _limit_damping(c, D_task):
     """Give every joint the share of its dampers that its inertia takes beside a damping of the task, 1/s."""
     state, params = c.state, c.params
+    state.task_damping = D_task
     joint_damping_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
     state.joint_damping[:] = params.D_pose
     if state.mode != FREE:
@@ -240,21 +247,21 @@ def _posture(c):
     """Give what pulls to the posture and what damps it, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m."""
     state, params = c.state, c.params
     _follow_posture(state, params)
-    tau_spring = state.target.q_pose - c.measurement.q
+    tau_spring = state.target.q_pose - state.q
     shorten(tau_spring, params.posture_error_max_rad)
     tau_damping = np.empty(tau_spring.shape[0])
     for i in range(tau_spring.shape[0]):
         D = state.damping_share[i] * params.D_pose[i]
         tau_spring[i] *= state.posture_share * min(params.K_pose[i], D / (2.0 * params.loop_delay_s))
-        tau_damping[i] = -D * c.measurement.qd[i]
+        tau_damping[i] = -D * state.qd[i]
     return tau_spring, tau_damping
 
 
 @compiled
 def _tool_force(c, J_bar):
     """Force of the environment on the tool, (3,), N: measured, or without a sensor what the residual says, J#ᵀ r."""
-    if c.measurement.has_wrench != 0:
-        return c.measurement.wrench_ee[:3]
+    if c.state.has_wrench != 0:
+        return c.state.wrench_ee[:3]
     return matvec_t(J_bar, c.state.residual_trigger)[:3]
 
 
@@ -264,7 +271,7 @@ def _follow_share(state, params, wanted):
     if wanted < state.task_share:
         state.task_share = wanted
     else:
-        back = params.recover_share if state.holding == 0 else params.hold_share
+        back = state.step.recover_share if state.holding == 0 else state.step.hold_share
         state.task_share += back * (wanted - state.task_share)
 
 
@@ -272,13 +279,13 @@ def _follow_share(state, params, wanted):
 def _follow_posture(state, params):
     """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
     if state.mode == FREE:
-        state.posture_share += params.recover_share * (1.0 - state.posture_share)
+        state.posture_share += state.step.recover_share * (1.0 - state.posture_share)
     else:
         state.posture_share = params.posture_in_contact
 
 
 @compiled
-def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
+def _contact_law(c, pull, damping, task_disturbance, removed, share):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
@@ -286,7 +293,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
     the compensation gives way, then the pull of the task as a whole, last the damping.
     """
     state, params = c.state, c.params
-    qd, direction, M_inv = c.measurement.qd, c.state.direction, c.dynamics.M_inv
+    qd, direction, M_inv = c.state.qd, c.state.direction, c.dynamics.M_inv
     limit = _push_limit(c)
     damping -= params.null_damping * matvec_t(removed, state.damping_share * qd)
     damping -= params.contact_damping * state.damping_share * qd
@@ -308,7 +315,7 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, D_task):
         # After the bound, or the task would use up what the brake frees.
         approach = min(dot(direction, qd), 0.0)
         if approach < 0.0 and params.approach_damping > 0.0:
-            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - D_task)
+            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - state.task_damping)
             tau -= min(params.approach_damping, most) * approach * direction
     return tau
 
@@ -323,35 +330,58 @@ def _push_limit(c):
 
 
 @compiled
+def _refuse_unusable(state, tau):
+    """Repeat the last command where a law gave none that is finite."""
+    if not all_usable(tau):
+        _latch(state, _NO_TORQUE)
+        tau[:] = state.tau
+
+
+@compiled
+def _stop_joints(c, tau_net):
+    """Keep joints in their range and below their speed limits, in place."""
+    state, dynamics, params = c.state, c.dynamics, c.params
+    q, qd = state.q, state.qd
+    n = q.shape[0]
+    excess, intrusion = stack_vector(n), stack_vector(n)
+    dt = max(state.step.dt, params.dt)
+    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt)
+    if not joint_excess(
+        q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
+        excess, intrusion,
+    ):  # fmt: skip
+        return
+    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
+    rate = params.braking_rate - state.task_damping
+    joint_stop_gains(
+        dynamics.M, state.joint_damping, rate, excess, intrusion, params.joint_brake,
+        params.joint_stop_stiffness, params.loop_delay_s, brake, spring, drag,
+    )  # fmt: skip
+    joint_stop_torque(tau_net, dynamics.M_inv, qd, excess, intrusion, params.joint_margin, brake, spring, drag)
+
+
+@compiled
 def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
-    q, qd = c.measurement.q, c.measurement.qd
+    qd, step = state.qd, state.step
+    _refuse_unusable(state, tau)
+    # What joints are stopped from is what the motors will do, not what was wanted of them.
+    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step)
     tau -= dynamics.g + dynamics.c
-    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, params.dt)
-    n = tau.shape[0]
-    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
-    joint_stop_gains(
-        dynamics.M, params.joint_brake, params.joint_stop_stiffness, state.joint_damping, state.damping_limit,
-        params.loop_delay_s, brake, spring, drag,
-    )  # fmt: skip
-    joint_stop_torque(
-        tau, dynamics.M_inv, q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin,
-        params.joint_deceleration, brake, spring, drag,
-    )  # fmt: skip
+    _stop_joints(c, tau)
     tau += dynamics.c
     power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s)
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
         tau += joint_friction_into(params.friction, qd, state.friction)
-    if not _all_usable(tau):
-        _latch(state, _NO_TORQUE)
-        tau[:] = state.tau
-    out.limited = 1 if limit_torque(tau, state.tau, params.tau_max, params.torque_step) else 0
+    _refuse_unusable(state, tau)
+    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step) or clipped
+    out.limited = 1 if clipped else 0
     state.tau[:] = tau
     given = dot(tau - state.friction - dynamics.g, qd)
-    state.tank_j = min(state.tank_j + params.dt * (params.tank_power_w - given), params.tank_j)
+    state.tank_j = min(state.tank_j + step.dt * (params.tank_power_w - given), params.tank_j)
     out.torque[:] = tau
     out.residual[:] = state.residual
     out.residual_trigger[:] = state.residual_trigger
@@ -359,3 +389,4 @@ def _finish(c, tau):
     out.rotation[:] = dynamics.rotation
     out.velocity[:] = dynamics.velocity
     out.mode, out.holding, out.fault = state.mode, state.holding, state.fault
+    out.target_late = state.target_late

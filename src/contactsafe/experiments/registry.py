@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from contactsafe.errors import InvalidInputError
-from contactsafe.experiments import collisions, detection, disturbance, hostile, joint_safety, task_safety
+from contactsafe.experiments import clock, collisions, detection, disturbance, hostile, joint_safety, task_safety
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment
 
@@ -40,6 +40,7 @@ ENTRIES = {
     "collisions": Entry(collisions.collisions, lambda config: _count(config, len(config.plants)), trials=100),
     "detection": Entry(detection.detection, detection.count, trials=100),
     "hostile": Entry(hostile.hostile, lambda config: _count(config, 1), trials=100),
+    "clock": Entry(clock.clock, clock.count, trials=5),
 }
 
 

@@ -121,6 +121,7 @@ TITLES = {
     "collisions": "Collisions",
     "detection": "Detection",
     "hostile": "Hostile policy",
+    "clock": "Clocks",
 }
 
 _PUSHED = Aim(below=10.0, baseline_above=25.0, share=1 / 3)
@@ -203,6 +204,16 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
             aim=Aim(below=100.0, worst=True),
         ),
         Row("contact_peak_n", "contact force, peak", "N", main=True),
+    ),
+    "clock": (
+        Row("false_contact_ms", "contact reported that is none", "ms", aim=Aim(below=0.0, worst=True)),
+        Row("torque_step_nm", "torque step, largest", "N m", aim=Aim(below=1.0, worst=True)),
+        Row("tool_away_mm", "tool away from the undisturbed run", "mm", aim=Aim(below=2.0, worst=True)),
+        Row("tool_travel_mm", "tool's way until it rests", "mm"),
+        Row("joint_speed_left_rad_s", "joint speed in the end", "rad/s"),
+        Row("torque_step_back_nm", "torque step on reset, largest", "N m", aim=Aim(below=1.0, worst=True)),
+        Row("contact_peak_n", "contact force, peak", "N"),
+        Row("contact_peak_calm_n", "contact force undisturbed, peak", "N"),
     ),
 }  # fmt: skip
 """Rows of the known experiments. Metrics not named here are in `summary.json` only."""

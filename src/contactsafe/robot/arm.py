@@ -13,6 +13,7 @@ from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
 from contactsafe.robot.rotation import matrix_to_quat
 from contactsafe.robot.skin import SKIN_COLUMNS, capsule_skin
+from contactsafe.robot.soundness import refuse_unsound
 
 
 class Pose(NamedTuple):
@@ -65,6 +66,9 @@ class Arm:
         skin: points of the links' surface, (P, 7), rows as in `contactsafe.robot.skin`; empty where unknown.
         lever_doubted: lever arm at which a point of the skin is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
+
+    Raises:
+        InvalidInputError: gravity, the model or a limit is not finite, or a joint's range is empty.
     """
 
     name: str
@@ -81,6 +85,10 @@ class Arm:
     tool: Tool | None = None
     skin: np.ndarray = field(default_factory=lambda: np.zeros((0, SKIN_COLUMNS)))
     lever_doubted: float = 0.0
+
+    def __post_init__(self):
+        """Refuse what no arm can be."""
+        refuse_unsound(self)
 
     @property
     def n(self) -> int:

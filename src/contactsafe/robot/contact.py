@@ -16,6 +16,7 @@ from contactsafe.robot.native import view2
 from contactsafe.robot.skin import SKIN_COLUMNS
 
 _LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m
+_NO_LEVER = 1e-9  # m; a point with less explains no torque, and its square may be too small for a number
 
 
 @compiled
@@ -105,7 +106,7 @@ def best_point(handle, start, stop, torque, scratch, best, best_fit):
     for index in range(start, stop):
         skin_torque(handle, index, scratch)
         along = dot(scratch, torque)
-        if along <= 0.0:
+        if not along > _NO_LEVER:
             continue
         fit = along / math.sqrt((dot(scratch, scratch) + doubted) * dot(torque, torque))
         if fit > best_fit:

@@ -67,7 +67,7 @@ def from_mjcf(
     Raises:
         InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
             site, the choice of joints or actuators is ambiguous, torque limits are missing, a body of the arm
-            carries its own weight (gravcomp), or an equality constraint ties the arm.
+            carries its own weight (gravcomp), an equality constraint ties the arm, or gravity or a range is no number.
     """
     model = _loaded(scene)
     site_id = find(model, SITE, site)
