@@ -8,6 +8,7 @@ import hashlib
 import os
 import pathlib
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+from numba.core import event
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
@@ -69,3 +71,25 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
         return numba.njit(function, cache=True, **options)
     finally:
         numba.config.CACHE_DIR = before
+
+
+ANNOUNCEMENT = "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it ahead)"
+"""What is said on stderr when the first function has to be compiled; what is in the cache is loaded in silence."""
+
+
+class _Announcer(event.Listener):
+    """Says once a process that it compiles, before it does."""
+
+    said = False
+
+    def on_start(self, event):
+        ours = event.data["dispatcher"].py_func.__module__.startswith("contactsafe.")
+        if ours and not self.said and sys.stderr is not None:
+            self.said = True
+            print(ANNOUNCEMENT, file=sys.stderr, flush=True)
+
+    def on_end(self, event):
+        """Nothing is to be said then."""
+
+
+event.register("numba:compile", _Announcer())

@@ -31,7 +31,7 @@ _SETTLE_TICKS = 40
 
 @compiled
 def start(c):
-    """Begin at rest: momentum as measured, command at gravity, so that nothing jumps; the links weigh what is said."""
+    """Begin where the arm is: momentum as measured, command as last sent; the links weigh what is said."""
     state, dynamics, params = c.state, c.dynamics, c.params
     state.started = 1
     state.task_share, state.posture_share = 1.0, 1.0
@@ -45,8 +45,9 @@ def start(c):
     momentum_into(dynamics.M, c.measurement.qd, state.momentum)
     for i in range(state.beta.shape[0]):
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
-        # No torque was sent yet: whatever balanced the arm until now was g, so the first raw external torque is zero.
-        state.tau[i] = state.beta[i]
+        # What the torque last sent did is not known: all of it that the arm did not need is put down to friction this
+        # once, so that the first raw external torque is zero.
+        state.friction[i] = state.tau[i] - state.beta[i]
         state.tau_before[i] = state.tau[i]
 
 

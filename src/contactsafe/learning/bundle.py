@@ -18,6 +18,7 @@ from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, open_session
 from contactsafe.learning.scan import Scan
+from contactsafe.processes import Independent
 
 FORMAT = 3
 """Version of the folder's layout; raised when an older reader would misread it."""
@@ -71,7 +72,7 @@ def digest(data):
 
 
 @dataclass(frozen=True)
-class Bundle:
+class Bundle(Independent):
     """A checked bundle, its models running in ONNX Runtime.
 
     Attributes:

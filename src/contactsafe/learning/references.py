@@ -8,6 +8,7 @@ import numpy as np
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.foveate import RINGS, SECTORS, foveate, ground_of
 from contactsafe.errors import InvalidInputError
+from contactsafe.processes import Independent
 
 PRESS_N = 5.0
 """Force that the scripts press with, N."""
@@ -24,7 +25,7 @@ ARRIVED_M = 0.02
 """How near the tool comes to a corner before the next is its goal, m: friction keeps it from being nearer."""
 
 
-class _Script:
+class _Script(Independent):
     """Land slowly, press gently, and go where `_goal` says: what the scripts share.
 
     Args:
@@ -117,7 +118,7 @@ class NearestInk(_Script):
         return observation["pose"][i, :2] + away * (1.0 + beyond), True
 
 
-class Chance:
+class Chance(Independent):
     """Actions drawn evenly from all that are allowed.
 
     Args:

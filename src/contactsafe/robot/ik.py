@@ -9,6 +9,7 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError, UnreachableError
+from contactsafe.processes import Independent
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
@@ -34,12 +35,14 @@ _MARGIN = 0.1  # rad from a joint limit at which the pull off it begins
 _PULL = 0.2  # share of the missing margin that one iteration asks to win back
 
 
-class InverseKinematics:
+class InverseKinematics(Independent):
     """Find joint positions for tool poses, one thread at a time.
 
     Args:
         arm: whose limits and kinematics count.
     """
+
+    _bound = ("_reference",)
 
     def __init__(self, arm: Arm):
         self._arm = arm
@@ -48,6 +51,8 @@ class InverseKinematics:
         middle = (low + high) / 2
         spread = np.random.default_rng(0).uniform(low, high, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
+        # Or the first call would compile or load in somebody's control loop.
+        self._from_seed(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.array(arm.home))
 
     def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
         """Find joint positions within the limits that put the tool at a pose.

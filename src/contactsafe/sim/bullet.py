@@ -146,6 +146,15 @@ class BulletPlant:
         self.contacts, self.n_contacts = np.zeros(MAX_CONTACTS, dtype=contact_dtype), 0
         self.reset(arm.home)
 
+    def __reduce__(self):
+        raise InvalidInputError(
+            "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they "
+            "are to run, or take the MuJoCo engine"
+        )
+
+    def __copy__(self):
+        return self.__reduce__()
+
     def reset(self, q) -> None:
         """Put the arm at rest at q (n,) rad, in a world built anew: nothing of what was before is left."""
         bullet, client = self._bullet, self._client

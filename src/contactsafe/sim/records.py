@@ -118,12 +118,16 @@ def trace_dtype(n: int) -> np.dtype:
     )
 
 
-def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, config: WorldConfig) -> None:
-    """Fill a `plant_dtype` record; the caller keeps model and data alive."""
+def point_plant(plant, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Tell a `plant_dtype` record where model and data lie; the caller keeps them alive."""
     plant["model"], plant["data"] = model._address, data._address
     for name in VIEWED:
         plant[name] = getattr(data, name).ctypes.data
     plant["qpos_spring"] = model.qpos_spring.ctypes.data
+
+
+def fill_plant(plant, model: mujoco.MjModel, arm: Arm, config: WorldConfig) -> None:
+    """Fill a `plant_dtype` record but for what `point_plant` does."""
     for name in ("nq", "nv", "nbody", "ngeom", "nsensordata"):
         plant[name] = getattr(model, name)
     plant["tcp_site"] = model.site(TOOL_SITE).id

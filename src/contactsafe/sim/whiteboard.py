@@ -6,13 +6,14 @@ import numpy as np
 
 from contactsafe.compiled import compiled
 from contactsafe.errors import InvalidInputError
+from contactsafe.processes import Independent
 from contactsafe.sim.config import BoardConfig
 
 CLEAN, INK, OBJECT = 0, 1, 2
 """What a cell holds. An OBJECT is dark like ink in the camera's eyes, and no pad removes it."""
 
 
-class Whiteboard:
+class Whiteboard(Independent):
     """A board and its ink.
 
     Attributes:
