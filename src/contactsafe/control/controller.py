@@ -1,6 +1,5 @@
 """The controller for Python callers: checked at the door, then one compiled tick."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,11 @@ from contactsafe.robot.ik import InverseKinematics
 RANGE_TOLERANCE = 0.02
 """Joints may be measured this far past their limit at reset, rad: simulators' limits are soft, and encoders are off."""
 
-_SAME_PLACE = 0.05
-"""An arm within this of where it was last measured, rad, was not moved by others since: 20 ms at 2.5 rad/s."""
+_HELD_STIFFNESS = 150.0
+"""With which the present pose is held from a reset until a target is given, 1/s²."""
+
+_SAME_PLACE = 0.5
+"""An arm that is not this far from where it was last measured, rad, may have got there by itself: 0.2 s at 2.5 rad/s."""
 
 
 class Measurement(NamedTuple):
@@ -140,8 +142,9 @@ class Controller(Independent):
         """Forget everything and hold the present pose, taking the arm over as it is: at rest, moving, or held against.
 
         The command goes on from the torque last sent, within the torque rate limit; whoever knows it says so. Else it
-        is this controller's own last one, if the arm is where this controller last measured it (each joint within
-        0.05 rad), or what keeps an untouched arm as it is: gravity and Coriolis torque.
+        is this controller's own last one, or, where it has sent none and where a joint is over 0.5 rad from where it
+        was measured last (another episode, an arm led by hand), what keeps an untouched arm as it is: gravity and
+        Coriolis torque.
 
         Args:
             q: measured joint positions, (n,), rad; up to `RANGE_TOLERANCE` past a joint's limit.
@@ -164,7 +167,8 @@ class Controller(Independent):
         pose = self.arm.tool_pose(q)
         held = self.record["state"]["target"]
         held["position"], held["quat"], held["q_pose"] = pose.position, pose.quat, q
-        held["K_task"], held["D_task"] = 150.0, 2.0 * math.sqrt(150.0)
+        held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.stiffness_range)
+        held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.damping_range)
         self.record["target"] = held
         self._last_target = None
         self._is_reset = True
@@ -189,7 +193,8 @@ class Controller(Independent):
     def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
         """Give the torque that the arm is under, as far as this controller can know, (n,), N m."""
         state = self.record["state"]
-        if state["started"] and (np.abs(q - self.record["measurement"]["q"]) < _SAME_PLACE).all():
+        elsewhere = np.abs(q - self.record["measurement"]["q"]) > _SAME_PLACE  # not where that was not finite
+        if state["started"] and not elsewhere.any():
             return state["tau"].copy()
         return dynamics["g"] + dynamics["c"]
 
@@ -294,7 +299,7 @@ def _numbers(target: Target) -> list:
 def _taken_down(value):
     if value is None:
         return None
-    return tuple(value) if isinstance(value, list | tuple) else np.array(value, dtype=float).tobytes()
+    return tuple(value) if isinstance(value, list | tuple) else np.asarray(value).tobytes()
 
 
 def _shaped(value, n: int, name: str) -> np.ndarray:
