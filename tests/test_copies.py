@@ -21,7 +21,7 @@ import pytest
 import contactsafe as cs
 from contactsafe.control.records import controller_dtype
 from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.pushes import Pusher, Pushes
+from contactsafe.envs.pushes import Pushes
 from contactsafe.envs.sampling import MaskSampler
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.envs.wiping import WipingEnv
@@ -34,11 +34,9 @@ from contactsafe.learning.perception import Perception
 from contactsafe.learning.policy import Policy
 from contactsafe.learning.references import Chance, NearestInk, Raster
 from contactsafe.processes import Threads
-from contactsafe.robot.arm import NominalModel
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.randomisation import Randomisation
-from contactsafe.sim.variation import Variation
 from contactsafe.sim.whiteboard import Whiteboard
 from contactsafe.sim.world import Worlds
 
@@ -307,7 +305,9 @@ def public_classes():
 def is_plain(kind):
     """Whether a class is but data or words: a record, an error, a protocol."""
     record = dataclasses.is_dataclass(kind) or (issubclass(kind, tuple) and hasattr(kind, "_fields"))
-    return record or issubclass(kind, BaseException) or typing.is_typeddict(kind) or getattr(kind, "_is_protocol", False)
+    return (
+        record or issubclass(kind, BaseException) or typing.is_typeddict(kind) or getattr(kind, "_is_protocol", False)
+    )
 
 
 def test_every_public_class_has_an_entry():

@@ -73,7 +73,9 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
         numba.config.CACHE_DIR = before
 
 
-ANNOUNCEMENT = "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it ahead)"
+ANNOUNCEMENT = (
+    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it ahead)"
+)
 """What is said on stderr when the first function has to be compiled; what is in the cache is loaded in silence."""
 
 

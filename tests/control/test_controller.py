@@ -136,7 +136,9 @@ def test_a_target_that_is_changed_in_place_is_taken(panda, field, change):
     before = controller.record["target"].copy()
     change(target)
     controller.step(measured, target)
-    changed = {name for name in before.dtype.names if not np.array_equal(before[name], controller.record["target"][name])}
+    changed = {
+        name for name in before.dtype.names if not np.array_equal(before[name], controller.record["target"][name])
+    }
     assert changed == {field}
 
 

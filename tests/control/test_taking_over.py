@@ -92,7 +92,10 @@ def test_an_arm_found_elsewhere_is_taken_to_be_held_by_gravity_compensation(pand
         ({"qd": np.zeros(6)}, "qd has shape (6,); give 7 finite numbers"),
         ({"qd": np.full(7, np.inf)}, "qd[0] = inf; every number must be finite"),
         ({"torque": 0.0}, "torque has shape (); give 7 finite numbers"),
-        ({"torque": np.full(7, -90.0)}, "torque[0] = -90 N m is outside [-87, 87]; give the joint torque last sent, in N m"),
+        (
+            {"torque": np.full(7, -90.0)},
+            "torque[0] = -90 N m is outside [-87, 87]; give the joint torque last sent, in N m",
+        ),
     ],
 )
 def test_what_is_told_of_the_arm_is_checked_and_changes_nothing_when_refused(panda, told, text):

@@ -1,4 +1,4 @@
-"""What Gymnasium's other environments take and refuse, these do too: keyword arguments, order of calls, seeds, limits."""
+"""What Gymnasium's other environments take and refuse, these do too: keywords, order of calls, seeds, limits."""
 
 import copy
 
@@ -187,7 +187,9 @@ def test_a_vector_environment_says_when_it_resets_and_renders(envs):
 
 def test_gymnasiums_vector_wrappers_go_around_it():
     envs = gymnasium.make_vec(NAME, num_envs=2, config=SHORT)
-    envs = RecordEpisodeStatistics(TransformReward(RescaleAction(envs, np.float32(-2.0), np.float32(2.0)), lambda reward: 2.0 * reward))
+    envs = RecordEpisodeStatistics(
+        TransformReward(RescaleAction(envs, np.float32(-2.0), np.float32(2.0)), lambda reward: 2.0 * reward)
+    )
     envs.reset(seed=0)
     for _ in range(6):
         *_, info = envs.step(np.zeros((2, 18), np.float32))

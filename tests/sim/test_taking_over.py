@@ -1,4 +1,4 @@
-"""A controller that is reset while its arm moves or presses, in the closed loop of a world whose sensors have errors."""
+"""A controller that is reset while its arm moves or presses, in the closed loop of a world with real sensors."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ _HELD_STIFFNESS = 150.0
 """With which the present pose is held from a reset until a target is given, 1/s²."""
 
 _SAME_PLACE = 0.5
-"""An arm that is not this far from where it was last measured, rad, may have got there by itself: 0.2 s at 2.5 rad/s."""
+"""An arm that is less than this away from where it was last measured, rad, may have got there by itself."""
 
 
 class Measurement(NamedTuple):
@@ -174,21 +174,22 @@ class Controller(Independent):
         self._is_reset = True
 
     def _in_range(self, q: np.ndarray) -> np.ndarray:
-        low, high = self.arm.q_min, self.arm.q_max
-        past = np.maximum(low - q, q - high)
+        past = self._past_limits(q)
         if (past <= RANGE_TOLERANCE).all():
             return q
         i = int(np.argmax(past > RANGE_TOLERANCE))
-        in_degrees = np.abs(q).max() > 2.0 * np.pi and (np.maximum(low - np.radians(q), np.radians(q) - high) <= 0).all()
-        remedy = (
-            "these are degrees, give radians" if in_degrees
-            else "move the joint back by hand or in the robot's own mode, or correct the arm's range"
-        )  # fmt: skip
-        limit = f"above its limit {high[i]:.4f}" if q[i] > high[i] else f"below its limit {low[i]:.4f}"
+        low, high = self.arm.q_min[i], self.arm.q_max[i]
+        remedy = "move the joint back by hand or in the robot's own mode, or correct the arm's range"
+        if np.abs(q).max() > 2.0 * np.pi and (self._past_limits(np.radians(q)) <= 0.0).all():
+            remedy = "these are degrees, give radians"
+        limit = f"above its limit {high:.4f}" if q[i] > high else f"below its limit {low:.4f}"
         raise InvalidInputError(
             f"q[{i}] = {q[i]:.4f} rad, joint '{self.arm.model.joint(i).name}', is {past[i]:.4f} rad {limit}; "
             f"{RANGE_TOLERANCE} is tolerated: {remedy}"
         )
+
+    def _past_limits(self, q: np.ndarray) -> np.ndarray:
+        return np.maximum(self.arm.q_min - q, q - self.arm.q_max)
 
     def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
         """Give the torque that the arm is under, as far as this controller can know, (n,), N m."""

@@ -50,7 +50,9 @@ class _Wiping(Independent):
         if render_mode is not None and render_mode not in _RENDER_MODES:
             raise InvalidInputError(f"render_mode = {render_mode!r}; choose {' or '.join(_RENDER_MODES)}, or None")
         if max_episode_steps is not None and max_episode_steps < 1:
-            raise InvalidInputError(f"max_episode_steps = {max_episode_steps}; give 1 or more, or None for the config's")
+            raise InvalidInputError(
+                f"max_episode_steps = {max_episode_steps}; give 1 or more, or None for the config's"
+            )
         self.render_mode = render_mode
         self.tasks = self.task_type(config, num_envs)
         if max_episode_steps is not None:
