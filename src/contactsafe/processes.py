@@ -8,7 +8,9 @@ import copy
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
+
+from contactsafe.errors import InvalidInputError
 
 
 class Independent:
@@ -32,6 +34,18 @@ class Independent:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._bind()
+
+
+class Unique:
+    """An object that cannot be copied, for it holds what there is but once; `_why` says what, and the remedy."""
+
+    _why: ClassVar[str]
+
+    def __copy__(self) -> NoReturn:
+        raise InvalidInputError(self._why)
+
+    def __reduce__(self) -> NoReturn:
+        raise InvalidInputError(self._why)
 
 
 class Threads(Independent):
@@ -63,3 +77,9 @@ class Threads(Independent):
         if self._pool is not None and self._process == os.getpid():
             self._pool.shutdown()
         self._pool = None
+
+
+class OfTraining(Unique):
+    """What a training session holds open."""
+
+    _why = "what a training session holds open cannot be copied or pickled; go on from its checkpoint, with --resume"

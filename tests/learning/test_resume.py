@@ -30,6 +30,7 @@ from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
+from contactsafe.processes import Threads  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "evaluate_episodes": 0, "total_steps": 512}
 PPO = PpoConfig(epochs=2, **SMALL)
@@ -168,7 +169,7 @@ def one_thread(num_envs):
     env = real_boards(num_envs)
     worlds = env.unwrapped.tasks.worlds
     worlds.close()
-    worlds._threads = None
+    worlds._threads = Threads(1)
     return env
 
 

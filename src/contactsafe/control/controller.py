@@ -107,7 +107,7 @@ class Controller(Independent):
         record: everything the controller is made of; copy its `state` to save it.
     """
 
-    _bound = ("record", "_measured", "_reported")
+    _bound = ("record", "_ticked", "_measured", "_reported")
 
     def __init__(
         self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
@@ -134,6 +134,7 @@ class Controller(Independent):
 
     def _bind(self) -> None:
         self.record = self._records[self._index]
+        self._ticked = self._records.view(controller_dtype(self.arm.n))  # what was pickled has an equal type of its own
         self._measured = _views(self._records["measurement"], self._index)
         self._reported = _views(self._records["output"], self._index)
         self.record["handle"] = self._nominal.handle
@@ -226,7 +227,7 @@ class Controller(Independent):
         if target is not self._last_target or _numbers(target) != self._last_numbers:
             self.set_target(target)
         self._set_measurement(measurement)
-        tick_at(self._records, self._index)
+        tick_at(self._ticked, self._index)
         return self._output()
 
     def set_target(self, target: Target) -> None:

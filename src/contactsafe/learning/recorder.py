@@ -9,8 +9,10 @@ from stable_baselines3.common.logger import KVWriter
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
+from contactsafe.processes import OfTraining
 
-class Curves(KVWriter):
+
+class Curves(OfTraining, KVWriter):
     """TensorBoard's log of a run; points that a killed session wrote after its last checkpoint are hidden.
 
     Args:
@@ -42,7 +44,7 @@ def _let_the_second_pass(folder):
         time.sleep(left)
 
 
-class Recorder(BaseCallback):
+class Recorder(OfTraining, BaseCallback):
     """Logs, shows progress and saves once a rollout, between updates; stops there when time is up.
 
     Args:

@@ -16,6 +16,7 @@ from contactsafe.learning.checkpoints import (
 )
 from contactsafe.learning.policy_config import SESSION_FIELDS
 from contactsafe.learning.replay import ReplayFile
+from contactsafe.processes import OfTraining
 from contactsafe.sim.snapshot import generator_state
 
 FORMAT = 3
@@ -53,7 +54,7 @@ def load_run(config, encoder_digest):
     return state
 
 
-class Run:
+class Run(OfTraining):
     """Saves and restores a model of Stable-Baselines3 together with its environment.
 
     Args:

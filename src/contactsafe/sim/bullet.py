@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.processes import Unique
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import numbers
@@ -109,7 +110,7 @@ def _connect(joint: ET.Element, origin: ET.Element | None, parent: str, child: s
     ET.SubElement(joint, "child", link=child)
 
 
-class BulletPlant:
+class BulletPlant(Unique):
     """Arm, table and board in a PyBullet client of their own.
 
     Args:
@@ -125,6 +126,11 @@ class BulletPlant:
     Raises:
         InvalidInputError: pybullet is not installed, the arm has no facts, or obstacles are asked for.
     """
+
+    _why = (
+        "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they are "
+        "to run, or take the MuJoCo engine"
+    )
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()
@@ -145,15 +151,6 @@ class BulletPlant:
         self.q, self.qd = np.zeros(arm.n), np.zeros(arm.n)
         self.contacts, self.n_contacts = np.zeros(MAX_CONTACTS, dtype=contact_dtype), 0
         self.reset(arm.home)
-
-    def __reduce__(self):
-        raise InvalidInputError(
-            "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they "
-            "are to run, or take the MuJoCo engine"
-        )
-
-    def __copy__(self):
-        return self.__reduce__()
 
     def reset(self, q) -> None:
         """Put the arm at rest at q (n,) rad, in a world built anew: nothing of what was before is left."""

@@ -1,5 +1,6 @@
 """A simulated world as NumPy records: where its plant lies in memory, its sensors' errors, what a step measured."""
 
+import functools
 import math
 
 import mujoco
@@ -30,6 +31,7 @@ def noise_channels(n: int) -> int:
     return 3 * n + 9
 
 
+@functools.cache  # as for `controller_dtype`
 def plant_dtype(n: int) -> np.dtype:
     """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
     return np.dtype(
@@ -92,6 +94,7 @@ report_dtype = np.dtype(
 """What one policy step measured in the simulator: for rewards, metrics and tests, never for a controller."""
 
 
+@functools.cache
 def trace_dtype(n: int) -> np.dtype:
     """Describe one tick as recorded for experiments."""
     return np.dtype(
