@@ -99,8 +99,7 @@ def test_reset_forgets_everything_but_the_torque_that_was_sent_last(panda, recor
     q, qd, wrench, torque, target = recording
     records, controllers = prepared(panda, target)
     run_compiled(records, 0, q, qd, wrench, np.zeros_like(torque))
-    at_rest = panda.dynamics(panda.home, np.zeros(7))
-    controllers[0].reset(panda.home, torque=at_rest["g"] + at_rest["c"])
+    controllers[0].reset(panda.home, torque=panda.dynamics(panda.home, np.zeros(7))["g"])
     controllers[0].set_target(target)
     again = np.zeros_like(torque)
     run_compiled(records, 0, q, qd, wrench, again)

@@ -144,8 +144,7 @@ class Controller(Independent):
 
         The command goes on from the torque last sent, within the torque rate limit; whoever knows it says so. Else it
         is this controller's own last one, or, where it has sent none and where a joint is over 0.5 rad from where it
-        was measured last (another episode, an arm led by hand), what keeps an untouched arm as it is: gravity and
-        Coriolis torque.
+        was measured last (another episode, an arm led by hand), gravity, which keeps an untouched arm at rest.
 
         Args:
             q: measured joint positions, (n,), rad; up to `RANGE_TOLERANCE` past a joint's limit.
@@ -198,7 +197,7 @@ class Controller(Independent):
         elsewhere = np.abs(q - self.record["measurement"]["q"]) > _SAME_PLACE  # not where that was not finite
         if state["started"] and not elsewhere.any():
             return state["tau"].copy()
-        return dynamics["g"] + dynamics["c"]
+        return dynamics["g"].copy()
 
     def _within_limit(self, torque) -> np.ndarray:
         torque = self.arm.joint_vector(torque, "torque")
