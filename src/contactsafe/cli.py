@@ -31,6 +31,7 @@ from contactsafe.sim.drawings import Boards
 _COMPILES = "the first run compiles for a minute or two"
 
 Controller = Annotated[str, one_of(presets.PRESETS)]
+Joints = Annotated[tuple[str, ...], some_of(map(str, range(1, 15)))]
 Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS)]
 BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
 
@@ -218,6 +219,28 @@ def bench(json: bool = False, bundle: BundleFolder = None) -> None:
     print(f"environment steps per second: {1e6 / per_step.median_us:.0f}")
 
 
+def warmup(joints: Joints = ("6", "7")) -> None:
+    """Compile everything for this machine beforehand: for container images and CI.
+
+    What is compiled lies in a folder that this prints at the end, and stays good until this package, numba or NumPy
+    changes; NUMBA_CACHE_DIR chooses another. In an image, build as the user and on the kind of processor that will run.
+
+    Args:
+        joints: of the arms that will be driven, 1 to 14: controllers are compiled for each number.
+    """
+    from contactsafe.warmup import steps
+
+    started = time.monotonic()
+    parts = steps(joints)
+    with tqdm(total=len(parts), desc="compiling", file=sys.stderr) as bar:
+        for name, run in parts.items():
+            bar.set_description_str(name)
+            run()
+            bar.update()
+    size = sum(path.stat().st_size for path in Path(CACHE_FOLDER).rglob("*") if path.is_file())
+    print(f"compiled in {time.monotonic() - started:.0f} s: {CACHE_FOLDER}, {size / 1e6:.0f} MB")
+
+
 def train(arguments: Sequence[str]) -> None:
     """Prepare the eyes (vae) or train a policy (ppo, sac)."""
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -301,6 +324,7 @@ COMMANDS = {
     "evaluate": _Command(evaluate),
     "experiment": _Command(experiment),
     "bench": _Command(bench),
+    "warmup": _Command(warmup),
 }
 
 

@@ -24,7 +24,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from numba.core import caching
+from numba.core import caching, event
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
@@ -274,3 +274,27 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
         finally:
             numba.config.CACHE_DIR = before
     return dispatcher
+
+
+ANNOUNCEMENT = (
+    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it ahead)"
+)
+"""What is said on stderr when the first function has to be compiled; what is in the cache is loaded in silence."""
+
+
+class _Announcer(event.Listener):
+    """Says once a process that it compiles, before it does."""
+
+    said = False
+
+    def on_start(self, event):
+        ours = event.data["dispatcher"].py_func.__module__.startswith("contactsafe.")
+        if ours and not self.said and sys.stderr is not None:
+            self.said = True
+            print(ANNOUNCEMENT, file=sys.stderr, flush=True)
+
+    def on_end(self, event):
+        """Nothing is to be said then."""
+
+
+event.register("numba:compile", _Announcer())

@@ -41,12 +41,31 @@ def test_step_before_reset(panda):
         (np.full(7, np.nan), "q[0] = nan; every number must be finite"),
         (
             np.zeros(7),
-            "q[3] = 0.0000 rad is outside [-3.0718, -0.0698]; give measured joint positions in radians",
+            "q[3] = 0.0000 rad, joint 'joint4', is 0.0698 rad above its limit -0.0698; 0.02 is tolerated: "
+            "move the joint back by hand or in the robot's own mode, or correct the arm's range",
+        ),
+        (
+            np.array([0.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0]),
+            "q[1] = -45.0000 rad, joint 'joint2', is 43.2372 rad below its limit -1.7628; 0.02 is tolerated: "
+            "these are degrees, give radians",
         ),
     ],
 )
 def test_reset_at_what_is_no_posture(panda, q, text):
     assert refusal(Controller(panda).reset, q) == text
+
+
+@pytest.mark.parametrize("past", [1e-9, 0.002, 0.0199])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_joint_that_stands_a_little_past_its_limit_is_no_obstacle(panda, past, side):
+    """Simulators' limits are soft and encoders are off; the joint is brought back, the command does not jump."""
+    q = panda.home.copy()
+    q[3] = panda.q_max[3] + past if side > 0 else panda.q_min[3] - past
+    plant, controller = Plant(panda, q), controller_at(panda, presets.safe(), q)
+    torques = [panda.dynamics(q, np.zeros(7))["g"]]
+    plant.run(controller, hold(panda, q), 1000, each=lambda out: torques.append(out.torque))
+    assert np.abs(np.diff(torques, axis=0)).max() <= float(controller.record["params"]["torque_step"]) + 1e-9
+    assert panda.q_min[3] - 1e-3 < plant.q[3] < panda.q_max[3] + 1e-3
 
 
 @pytest.mark.parametrize(
@@ -90,6 +109,57 @@ def test_target_that_means_nothing_leaves_the_last_one_in_force(panda, controlle
     target = hold(panda)._replace(**changed)
     assert refusal(controller.step, Measurement(panda.home, np.zeros(7)), target) == text
     assert controller.record["target"] == before
+
+
+def changeable(panda):
+    """Make a target of arrays and lists that may be changed in place."""
+    pose = Pose(np.array([0.4, 0.0, 0.4]), np.array([0.0, 1.0, 0.0, 0.0]))
+    return Target(pose, [150.0] * 6, np.full(6, 25.0), panda.home.copy())
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("position", lambda target: target.pose.position.__setitem__(0, 0.41)),
+        ("quat", lambda target: target.pose.quat.__setitem__(slice(None), (0.0, 0.0, 1.0, 0.0))),
+        ("K_task", lambda target: target.stiffness.__setitem__(2, 90.0)),
+        ("D_task", lambda target: target.damping.__imul__(1.1)),
+        ("q_pose", lambda target: target.posture.__iadd__(0.01)),
+    ],
+)
+def test_a_target_that_is_changed_in_place_is_taken(panda, field, change):
+    controller, target = controller_at(panda, presets.safe()), changeable(panda)
+    measured = Measurement(panda.home, np.zeros(7))
+    controller.step(measured, target)
+    before = controller.record["target"].copy()
+    change(target)
+    controller.step(measured, target)
+    changed = {
+        name for name in before.dtype.names if not np.array_equal(before[name], controller.record["target"][name])
+    }
+    assert changed == {field}
+
+
+def test_a_target_that_is_changed_in_place_is_checked_at_every_step(panda):
+    controller, target = controller_at(panda, presets.safe()), changeable(panda)
+    measured = Measurement(panda.home, np.zeros(7))
+    controller.step(measured, target)
+    before = controller.record["target"].copy()
+    target.pose.position[1] = np.nan
+    for _ in range(2):
+        text = refusal(controller.step, measured, target)
+        assert text == "pose.position[1] = nan; every number must be finite"
+    assert controller.record["target"] == before
+    target.pose.position[1] = 0.0
+    controller.step(measured, target)
+
+
+def test_a_target_that_stays_as_it_is_costs_no_search(panda, monkeypatch):
+    controller, target = controller_at(panda, presets.safe()), changeable(panda)._replace(posture=None)
+    measured = Measurement(panda.home, np.zeros(7))
+    controller.step(measured, target)
+    monkeypatch.setattr(controller, "set_target", lambda target: pytest.fail("it was checked again"))
+    controller.step(measured, target)
 
 
 def test_pose_out_of_reach_without_a_posture(panda, controller):

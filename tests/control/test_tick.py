@@ -95,11 +95,11 @@ def test_saved_state_goes_on_with_the_same_bits(panda, recording, saved_at):
     assert_array_equal(rest, torque[saved_at:])
 
 
-def test_reset_forgets_everything(panda, recording):
+def test_reset_forgets_everything_but_the_torque_that_was_sent_last(panda, recording):
     q, qd, wrench, torque, target = recording
     records, controllers = prepared(panda, target)
     run_compiled(records, 0, q, qd, wrench, np.zeros_like(torque))
-    controllers[0].reset(panda.home)
+    controllers[0].reset(panda.home, torque=panda.dynamics(panda.home, np.zeros(7))["g"])
     controllers[0].set_target(target)
     again = np.zeros_like(torque)
     run_compiled(records, 0, q, qd, wrench, again)

@@ -156,5 +156,5 @@ def test_random_nonsense_never_gives_a_torque_that_is_not_finite(panda):
         before = torque
         if rng.random() < 0.3:
             c["measurement"]["q"], c["measurement"]["qd"] = panda.home, rng.normal(size=7)
-    controller.reset(panda.home)
+    controller.reset(panda.home, torque=g)
     assert_allclose(controller.step(good, hold(panda)).torque, g, rtol=0, atol=1e-9)

@@ -22,6 +22,7 @@ from tests.learning.fakes import FakeWiping  # noqa: E402
 
 import contactsafe  # noqa: E402, F401 -- registers the task
 from contactsafe.cli import main  # noqa: E402
+from contactsafe.copying import Threads  # noqa: E402
 from contactsafe.envs.config import WipingConfig  # noqa: E402
 from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
@@ -168,7 +169,7 @@ def one_thread(num_envs):
     env = real_boards(num_envs)
     worlds = env.unwrapped.tasks.worlds
     worlds.close()
-    worlds._threads = None
+    worlds._threads = Threads(1)
     return env
 
 

@@ -1,6 +1,5 @@
 """The controller for Python callers: checked at the door, then one compiled tick."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +8,19 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.control.presets import safe
 from contactsafe.control.records import CONTACT, FAULTS, controller_dtype, fill_params
 from contactsafe.control.tick import tick_at
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.ik import InverseKinematics
+
+RANGE_TOLERANCE = 0.02
+"""Joints may be measured this far past their limit at reset, rad: simulators' limits are soft, and encoders are off."""
+
+_HELD_STIFFNESS = 150.0
+"""With which the present pose is held from a reset until a target is given, 1/s²."""
+
+_SAME_PLACE = 0.5
+"""An arm that is less than this away from where it was last measured, rad, may have got there by itself."""
 
 
 class Measurement(NamedTuple):
@@ -90,8 +99,11 @@ class Output(NamedTuple):
     target_late: bool = False
 
 
-class Controller:
+class Controller(Independent):
     """A contact-safe Cartesian variable impedance controller for one arm.
+
+    The first one for arms of so many joints compiles what a step needs, or loads it, which is said when it takes long.
+    A copy, pickled or not, goes on by itself from where this one is.
 
     Args:
         arm: `contactsafe.robots.panda()` or another.
@@ -103,6 +115,8 @@ class Controller:
         record: everything the controller is made of; copy its `state` to save it.
     """
 
+    _bound = ("record", "_ticked", "_measured", "_reported", "_kept")
+
     def __init__(
         self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
     ):
@@ -113,56 +127,103 @@ class Controller:
             raise InvalidInputError(
                 f"config is {type(config).__name__}; give a ControllerConfig such as contactsafe.presets.safe()"
             )
+        _warm_up(arm, config)
         self.arm = arm
         self.config = config
         self._nominal = arm.nominal()
         self._ik = InverseKinematics(arm)
         self._records = np.zeros(1, dtype=controller_dtype(arm.n)) if records is None else records
         self._index = index
-        self.record = self._records[index]
-        self._measured = _views(self._records["measurement"], index)
-        self._reported = _views(self._records["output"], index)
-        self._kept = _views(self._records["target"], index)["kept"]
-        self.record["handle"] = self._nominal.handle
+        self._bind()
         fill_params(self.record["params"], config, arm)
         self._last_target: Target | None = None
+        self._last_numbers: list = []
         self._is_reset = False
 
-    def reset(self, q) -> None:
-        """Forget everything and hold the present pose.
+    def _bind(self) -> None:
+        self.record = self._records[self._index]
+        self._ticked = self._records.view(controller_dtype(self.arm.n))  # what was pickled has an equal type of its own
+        self._measured = _views(self._records["measurement"], self._index)
+        self._reported = _views(self._records["output"], self._index)
+        self._kept = _views(self._records["target"], self._index)["kept"]
+        self.record["handle"] = self._nominal.handle
+
+    def reset(self, q, qd=None, torque=None) -> None:
+        """Forget everything and hold the present pose, taking the arm over as it is: at rest, moving, or held against.
+
+        The command goes on from the torque last sent, within the torque rate limit; whoever knows it says so. Else it
+        is this controller's own last one, or, where it has sent none and where a joint is over 0.5 rad from where it
+        was measured last (another episode, an arm led by hand), gravity, which keeps an untouched arm at rest.
 
         Args:
-            q: measured joint positions, (n,), rad.
+            q: measured joint positions, (n,), rad; up to `RANGE_TOLERANCE` past a joint's limit.
+            qd: measured joint velocities, (n,), rad/s; None for an arm at rest.
+            torque: joint torque last sent, gravity included, (n,), N m; None where it is not known.
 
         Raises:
-            InvalidInputError: q has the wrong shape, is not finite, or lies outside the joint range.
+            InvalidInputError: a wrong shape, a number that is not finite, joints outside their range, or more torque
+                than the arm's limit.
         """
-        q = self.arm.joint_vector(q, "q")
-        outside = (q < self.arm.q_min) | (q > self.arm.q_max)
-        if outside.any():
-            i = int(np.argmax(outside))
-            raise InvalidInputError(
-                f"q[{i}] = {q[i]:.4f} rad is outside [{self.arm.q_min[i]:.4f}, {self.arm.q_max[i]:.4f}]; "
-                "give measured joint positions in radians"
-            )
+        q = self._in_range(self.arm.joint_vector(q, "q"))
+        qd = np.zeros(self.arm.n) if qd is None else self.arm.joint_vector(qd, "qd")
+        dynamics = self.arm.dynamics(q, qd)
+        tau = self._last_torque(q, dynamics) if torque is None else self._within_limit(torque)
         for part in ("state", "output"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
-        # Should the first measurement be unusable, the torque to repeat is the one that keeps the arm where it is.
-        self.record["dynamics"] = self.arm.dynamics(q, np.zeros(self.arm.n))
-        self.record["state"]["tau"] = self.record["dynamics"]["g"]
+        self.record["dynamics"] = dynamics
+        self.record["state"]["tau"] = tau
+        self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
         pose = self.arm.tool_pose(q)
         held = self.record["state"]["target"]
         held["position"], held["quat"], held["q_pose"] = pose.position, pose.quat, q
-        held["K_task"], held["D_task"] = 150.0, 2.0 * math.sqrt(150.0)
+        held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.stiffness_range)
+        held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.damping_range)
         self.record["target"] = held
         self._last_target = None
         self._is_reset = True
 
+    def _in_range(self, q: np.ndarray) -> np.ndarray:
+        past = self._past_limits(q)
+        if (past <= RANGE_TOLERANCE).all():
+            return q
+        i = int(np.argmax(past > RANGE_TOLERANCE))
+        low, high = self.arm.q_min[i], self.arm.q_max[i]
+        remedy = "move the joint back by hand or in the robot's own mode, or correct the arm's range"
+        if np.abs(q).max() > 2.0 * np.pi and (self._past_limits(np.radians(q)) <= 0.0).all():
+            remedy = "these are degrees, give radians"
+        limit = f"above its limit {high:.4f}" if q[i] > high else f"below its limit {low:.4f}"
+        raise InvalidInputError(
+            f"q[{i}] = {q[i]:.4f} rad, joint '{self.arm.model.joint(i).name}', is {past[i]:.4f} rad {limit}; "
+            f"{RANGE_TOLERANCE} is tolerated: {remedy}"
+        )
+
+    def _past_limits(self, q: np.ndarray) -> np.ndarray:
+        return np.maximum(self.arm.q_min - q, q - self.arm.q_max)
+
+    def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
+        """Give the torque that the arm is under, as far as this controller can know, (n,), N m."""
+        state = self.record["state"]
+        elsewhere = np.abs(q - self.record["measurement"]["q"]) > _SAME_PLACE  # not where that was not finite
+        if state["started"] and not elsewhere.any():
+            return state["tau"].copy()
+        return dynamics["g"].copy()
+
+    def _within_limit(self, torque) -> np.ndarray:
+        torque = self.arm.joint_vector(torque, "torque")
+        over = np.abs(torque) > self.arm.tau_max
+        if over.any():
+            i = int(np.argmax(over))
+            raise InvalidInputError(
+                f"torque[{i}] = {torque[i]:.4g} N m is outside [{-self.arm.tau_max[i]:g}, {self.arm.tau_max[i]:g}]; "
+                "give the joint torque last sent, in N m"
+            )
+        return torque
+
     def step(self, measurement: Measurement, target: Target | None = None) -> Output:
         """Run one tick of 1 ms.
 
-        A target that is the very object of the last call is not checked again. None says that no new one came: the
-        last one holds, for `target_timeout_s` at most.
+        A target whose object and numbers are those of the last call is not checked again. None says that no new one
+        came: the last one holds, for `target_timeout_s` at most.
 
         Raises:
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
@@ -173,15 +234,15 @@ class Controller:
                 "the controller was not reset; call reset(q) with the measured joint positions first"
             )
         self._kept[...] = target is None
-        if target is not None and target is not self._last_target:
+        if target is not None and (target is not self._last_target or _numbers(target) != self._last_numbers):
             self.set_target(target)
         self._set_measurement(measurement)
-        tick_at(self._records, self._index)
+        tick_at(self._ticked, self._index)
         return self._output()
 
     def set_target(self, target: Target) -> None:
         """Check a target and make it the one in force; on error the last one stays."""
-        record = self.record["target"]
+        record, numbers = self.record["target"], _numbers(target)  # before they are checked: others may change them
         position = finite_array(target.pose.position, (3,), "pose.position")
         quat = unit_quaternion(target.pose.quat, "pose.quat")
         stiffness = self._gain(target.stiffness, "stiffness", "1/s²", self.config.stiffness_range)
@@ -193,7 +254,7 @@ class Controller:
             posture = self.arm.joint_vector(target.posture, "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
-        self._last_target = target
+        self._last_target, self._last_numbers = target, numbers
 
     def _gain(self, value, name: str, unit: str, allowed: tuple[float, float]) -> np.ndarray:
         gain = finite_array(value, (6,), name)
@@ -245,6 +306,19 @@ def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
     }
 
 
+def _numbers(target: Target) -> list:
+    """Take down a target's numbers in whatever form is quickly compared: they may be changed in place."""
+    pose = target.pose
+    given = (pose.position, pose.quat, target.stiffness, target.damping, target.posture)
+    return [value.tobytes() if type(value) is np.ndarray else _taken_down(value) for value in given]
+
+
+def _taken_down(value):
+    if value is None:
+        return None
+    return tuple(value) if isinstance(value, list | tuple) else np.asarray(value).tobytes()
+
+
 def _shaped(value, n: int, name: str) -> np.ndarray:
     """Check a measurement's shape only: numbers that are not finite are the tick's to refuse, the arm must not drop."""
     array = np.asarray(value, dtype=float)
@@ -271,3 +345,18 @@ def unit_quaternion(value, name: str) -> np.ndarray:
     if abs(norm - 1.0) > 1e-3:
         raise InvalidInputError(f"{name} has length {norm:.4g}; give a unit quaternion w x y z (divide by its length)")
     return quat / norm
+
+
+_WARM: set[int] = set()
+"""Numbers of joints for which this process has compiled a step, or loaded it: records of other arms are other types."""
+
+
+def _warm_up(arm: Arm, config: ControllerConfig) -> None:
+    """Run a step of a controller that drives nothing: the first one in a process compiles or loads for a long time."""
+    if arm.n in _WARM:
+        return
+    _WARM.add(arm.n)
+    controller, q, still = Controller(arm, config), np.clip(arm.home, arm.q_min, arm.q_max), np.zeros(arm.n)
+    controller.reset(q)
+    gains = np.full(6, config.stiffness_range[0]), np.full(6, config.damping_range[0])
+    controller.step(Measurement(q, still, np.zeros(6)), Target(arm.tool_pose(q), *gains))

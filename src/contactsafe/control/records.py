@@ -3,6 +3,7 @@
 One controller is one record of `controller_dtype(n)`; many are an array of them; its state is saved by copying it.
 """
 
+import functools
 import math
 from dataclasses import fields
 
@@ -273,6 +274,7 @@ def output_dtype(n: int) -> np.dtype:
     )
 
 
+@functools.cache  # numba compares types of records that are not the very same field by field, 10 us a call
 def controller_dtype(n: int) -> np.dtype:
     """Describe one whole controller for an arm of n joints."""
     return np.dtype(

@@ -96,7 +96,7 @@ def foveate(masks, tool_positions, ground, threads=None):
         masks: camera masks, (N, height, width) or (N, height, width, 1), uint8: 0 is ink, 255 all else.
         tool_positions: tool points in world, (N, 2) or wider, m; only x and y are read.
         ground: `Ground` of the camera.
-        threads: a ThreadPoolExecutor that shares the work; None to do it here.
+        threads: `Threads` that share the work; None to do it here.
 
     Returns:
         (N, FEATURES) float32.

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.world import TICK_S, Worlds
 
@@ -36,7 +37,7 @@ class Pushes:
             raise InvalidInputError(f"pushes links = {self.links}; give some of 1 to 7")
 
 
-class Pusher:
+class Pusher(Independent):
     """Pushes the arms of some worlds.
 
     Args:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.envs.action import DOWN
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
@@ -15,7 +16,7 @@ _SHARE_RAISED = 0.1
 _SHARE_BLANK = 0.2  # of the boards that were wiped clean: the rest are drawn anew
 
 
-class MaskSampler:
+class MaskSampler(Independent):
     """Draw masks such as a wiping episode shows, without running one.
 
     Args:

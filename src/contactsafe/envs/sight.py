@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.sim.photograph import PHOTO_PX, Photographer
 from contactsafe.sim.world import Worlds
 from contactsafe.vision.segment import Segmenter
 
 
-class PhotographSight:
+class PhotographSight(Independent):
     """Cameras over the boards of some worlds, and what finds the ink in their pictures.
 
     It keeps no state: light, pen and camera of an episode follow from `light` of its `task_dtype` record, the noise of

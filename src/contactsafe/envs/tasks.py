@@ -1,11 +1,13 @@
 """N wiping tasks stepped together: what the single and the vector environment share."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from contactsafe.control import presets
+from contactsafe.copying import Independent
 from contactsafe.envs.action import DOWN, action_limits
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.pushes import Pusher
@@ -38,8 +40,20 @@ def _sight(config: WipingConfig, worlds: Worlds):
     return PhotographSight(worlds)
 
 
-class WipingTasks:
+def _checked(config: WipingConfig | None) -> WipingConfig:
+    if config is not None and not isinstance(config, WipingConfig):
+        raise InvalidInputError(
+            f"config is {type(config).__name__}; give a WipingConfig (contactsafe.envs.config), such as "
+            "WipingConfig(episode_s=10.0)"
+        )
+    return config or WipingConfig()
+
+
+class WipingTasks(Independent):
     """Boards to be wiped, N at a time.
+
+    The first ones of a kind in a process compile what a step needs, or load it, which is said when it takes long. A
+    copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
         config: of the task.
@@ -66,7 +80,7 @@ class WipingTasks:
         seed: int | Sequence[int] | None = None,
         worlds: Sequence[WorldConfig] | None = None,
     ):
-        self.config = config or WipingConfig()
+        self.config = _checked(config)
         self.arm = robots.panda()
         controller = presets.by_name(self.config.controller)
         ranges = self.config.randomisation
@@ -87,6 +101,7 @@ class WipingTasks:
         self._actions = np.zeros((n, ACTION_SIZE))
         self._ik = InverseKinematics(self.arm)
         self._rule = posture_rule(self.arm)
+        _warm_up(self)
 
     def reset(self, i: int, rng: np.random.Generator, drawing: np.ndarray | None = None, start=None) -> None:
         """Begin an episode in task i.
@@ -242,3 +257,21 @@ class WipingTasks:
             "is_success": tasks["clean"] == 1,
             "arm_touched": tasks["arm_touched"] == 1,
         }
+
+
+_WARM: set[tuple] = set()
+"""Kinds of tasks whose step this process has compiled or loaded."""
+
+
+def _warm_up(tasks: WipingTasks) -> None:
+    """Wipe for one step on a board of our own: the first step in a process compiles or loads for a long time."""
+    kind = next(kind for kind in type(tasks).__mro__ if kind.__module__.startswith("contactsafe."))
+    config = tasks.config
+    sort = (kind, config.sight, config.randomisation is not None)
+    if sort in _WARM:
+        return
+    _WARM.add(sort)
+    scratch = kind(replace(config, boards="strokes"), 1)
+    scratch.reset(0, np.random.default_rng(0))
+    scratch.step(np.zeros((1, ACTION_SIZE)))
+    scratch.worlds.close()

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.experiments.collision_scenes import LEAD_M, Motion
 from contactsafe.robot.ik import solve_ik
 from contactsafe.sim.records import trace_dtype
 from contactsafe.sim.world import MAX_TICKS, Worlds, ticks_of_step
 
 
-class Playback:
+class Playback(Independent):
     """Motions played side by side, one in each world, from their beginning.
 
     Args:
@@ -23,17 +24,23 @@ class Playback:
         lengths: of the motions, ticks, (n,).
     """
 
+    _bound = ("_target", "_tool")
+
     def __init__(self, worlds: Worlds, motions: Sequence[Motion]):
         self.worlds, self.motions, self.ticks = worlds, motions, 0
         self.lengths = np.array([round(1000 * motion.duration_s) for motion in motions])
         self._step, self._nominal = 0, worlds.arm.nominal()
-        self._target, self._tool = worlds.controllers["target"], worlds.controllers["output"]["position"]
+        self._bind()
         for i, motion in enumerate(motions):
             worlds.reset(i, motion.q_start)
             self._target["quat"][i] = motion.start.quat
             self._target["K_task"][i] = motion.stiffness
             self._target["D_task"][i] = 2.0 * np.sqrt(motion.stiffness)
         self._tool[:] = worlds.controllers["dynamics"]["position"]
+
+    def _bind(self) -> None:
+        controllers = self.worlds.controllers
+        self._target, self._tool = controllers["target"], controllers["output"]["position"]
 
     @property
     def running(self) -> np.ndarray:

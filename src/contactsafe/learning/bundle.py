@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
+from contactsafe.copying import Independent
 from contactsafe.envs.foveate import FEATURES
 from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, InvalidInputError, shown
@@ -83,7 +84,7 @@ def digest(data):
 
 
 @dataclass(frozen=True)
-class Bundle:
+class Bundle(Independent):
     """A checked bundle, its models running in ONNX Runtime.
 
     Attributes:

@@ -1,10 +1,9 @@
 """From an observation to the latent, the same in training, in evaluation and on the robot. No torch."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import onnxruntime
 
+from contactsafe.copying import Independent, Threads
 from contactsafe.envs.foveate import FEATURES, SHARES, foveate, ground_of
 from contactsafe.envs.rectify import rectify
 from contactsafe.errors import BundleError, InvalidInputError
@@ -17,6 +16,20 @@ EYES_FORMAT = 3
 """Version of what vae.json holds and of what its numbers mean."""
 
 REPRESENTATIONS = ("foveated", *LEARNED)
+
+
+class _Session(onnxruntime.InferenceSession):
+    """A session that copies and pickles as the bytes it was started on; copies check and start them again."""
+
+    def __init__(self, model, name, options):
+        super().__init__(model, options, providers=["CPUExecutionProvider"])
+        self._opened = model, name, options.intra_op_num_threads
+
+    def __reduce__(self):
+        return open_session, self._opened
+
+    def __copy__(self):
+        return open_session(*self._opened)
 
 
 def open_session(model, name, threads=1):
@@ -39,7 +52,7 @@ def open_session(model, name, threads=1):
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.load_model_format", "ONNX")
     try:
-        return onnxruntime.InferenceSession(graph.model, options, providers=["CPUExecutionProvider"])
+        return _Session(graph.model, name, options)
     except Exception as error:
         reason = str(error).splitlines()[0][:160]
         raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
@@ -50,7 +63,7 @@ def encoder_ports(size, latent_size):
     return {"mask": ("uint8", [size, size])}, {"latent": ("float", [latent_size])}
 
 
-class Perception:
+class Perception(Independent):
     """Masks and tool positions in, latents out.
 
     Args:
@@ -76,7 +89,7 @@ class Perception:
         self.size = size
         self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
         self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
-        self._threads = ThreadPoolExecutor(SHARES) if share and self.ground is not None else None
+        self._threads = Threads(SHARES) if share and self.ground is not None else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
     def __call__(self, masks, tool_positions):
@@ -109,4 +122,4 @@ class Perception:
     def close(self):
         """End the threads."""
         if self._threads is not None:
-            self._threads.shutdown()
+            self._threads.close()

@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.envs.tasks import OBSERVED
 from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.bundle import ACTIONS, Bundle, blank_observation
 from contactsafe.learning.perception import Perception
 
 
-class Policy:
+class Policy(Independent):
     """The policy of a bundle: the mean of what was trained, and the motion laid over it, which knows the time.
 
     `begin` starts an episode; without it the motion goes on from where it is, which does no harm. For a batch, row i of

@@ -14,6 +14,7 @@ from tensorboard.compat.proto import event_pb2, summary_pb2
 from tensorboard.summary.writer.record_writer import RecordWriter
 from tqdm import tqdm
 
+from contactsafe.copying import OfTraining
 from contactsafe.files import cannot_write
 
 
@@ -63,7 +64,7 @@ class EventFile:
             raise cannot_write(self._path, error) from None
 
 
-class Curves(KVWriter):
+class Curves(OfTraining, KVWriter):
     """TensorBoard's log of a run; points that a killed session wrote after its last checkpoint are hidden.
 
     Args:
@@ -93,7 +94,7 @@ def _let_the_second_pass(folder):
         time.sleep(left)
 
 
-class Recorder(BaseCallback):
+class Recorder(OfTraining, BaseCallback):
     """Logs, shows progress and saves once a rollout, between updates; stops there when time is up.
 
     Args:

@@ -5,6 +5,7 @@ Each takes the task's observations and gives its actions as a policy does, 60 ti
 
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.foveate import RINGS, SECTORS, foveate, ground_of
 from contactsafe.errors import InvalidInputError
@@ -24,7 +25,7 @@ ARRIVED_M = 0.02
 """How near the tool comes to a corner before the next is its goal, m: friction keeps it from being nearer."""
 
 
-class _Script:
+class _Script(Independent):
     """Land slowly, press gently, and go where `_goal` says: what the scripts share.
 
     Args:
@@ -117,7 +118,7 @@ class NearestInk(_Script):
         return observation["pose"][i, :2] + away * (1.0 + beyond), True
 
 
-class Chance:
+class Chance(Independent):
     """Actions drawn evenly from all that are allowed.
 
     Args:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contactsafe.copying import OfTraining
 from contactsafe.errors import InvalidInputError
 from contactsafe.files import cannot_write
 
@@ -12,7 +13,7 @@ FIELDS = ("observations", "next_observations", "actions", "rewards", "dones", "t
 """Arrays of Stable-Baselines3's ReplayBuffer, one row a step of all environments."""
 
 
-class ReplayFile:
+class ReplayFile(OfTraining):
     """A ring of rows beside the checkpoint, longer than the buffer's own by what is written between two checkpoints.
 
     So a row is never written where a row of the last checkpoint lies, and a run killed while writing finds all that its

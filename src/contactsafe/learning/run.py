@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.save_util import recursive_getattr
 
+from contactsafe.copying import OfTraining
 from contactsafe.errors import InvalidInputError, shown
 from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, part, whole
 from contactsafe.learning.checkpoints import (
@@ -66,7 +67,7 @@ def load_run(config, encoder_digest):
     return state
 
 
-class Run:
+class Run(OfTraining):
     """Saves and restores a model of Stable-Baselines3 together with its environment.
 
     Args:

@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError, shown
 from contactsafe.learning.evaluation import step_values
 from contactsafe.learning.scan import Scan
@@ -15,7 +16,7 @@ from contactsafe.sim.snapshot import Part, check, of_array, of_object, put, take
 _STILL = Scan(amplitude=0.0)
 
 
-class EncodedVecEnv(VecEnv):
+class EncodedVecEnv(Independent, VecEnv):
     """Adapter from a gymnasium VectorEnv with Dict(pose, target, force, mask) to Stable-Baselines3.
 
     A time limit is reported as such (`TimeLimit.truncated` and `terminal_observation`), so PPO bootstraps there and

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.binding import Binding, bind_joints
 from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
@@ -28,27 +29,28 @@ class Pose(NamedTuple):
     quat: np.ndarray
 
 
-class NominalModel:
+class NominalModel(Independent):
     """One private copy of an arm's nominal model, to be used from one thread at a time.
 
     Attributes:
         handle: `handle_dtype` record for compiled code.
     """
 
+    _bound = ("_data", "handle")
+
     def __init__(self, model: mujoco.MjModel, site: str, skin: np.ndarray, lever_doubted: float):
         self._model = model
-        self._data = mujoco.MjData(model)
         self._site, self._skin = site, np.ascontiguousarray(skin, dtype=float)
         self._lever_doubted = lever_doubted
-        self.handle = make_handle(model, self._data, site, self._skin, lever_doubted)[0]
+        self._bind()
 
-    def __reduce__(self):
-        """Pickle by building anew: addresses mean nothing in another process."""
-        return NominalModel, (self._model, self._site, self._skin, self._lever_doubted)
+    def _bind(self) -> None:
+        self._data = mujoco.MjData(self._model)
+        self.handle = make_handle(self._model, self._data, self._site, self._skin, self._lever_doubted)[0]
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class Arm(Independent):
     """A serial torque-controlled arm with its tool.
 
     Attributes:

@@ -4,6 +4,8 @@ The numbers come from MuJoCo on a model of the arm alone; this file asks for the
 not give by itself: gravity apart from Coriolis torque, Cᵀ q̇, and J̇ q̇, all exact (no differences in time).
 """
 
+import functools
+
 import mujoco
 import numpy as np
 
@@ -42,6 +44,7 @@ handle_dtype = np.dtype(
 """Where a compiled function finds one nominal model: addresses of MjModel, MjData and its arrays; body numbers."""
 
 
+@functools.cache
 def dynamics_dtype(n: int) -> np.dtype:
     """Describe what is known of an arm at one (q, q̇): the record `update_dynamics` fills, n joints."""
     f = np.float64

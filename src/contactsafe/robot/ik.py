@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError, UnreachableError
 from contactsafe.files import readable
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
@@ -28,12 +29,14 @@ _MARGIN = 0.1  # rad from a joint limit at which the pull off it begins
 _PULL = 0.2  # share of the missing margin that one iteration asks to win back
 
 
-class InverseKinematics:
+class InverseKinematics(Independent):
     """Find joint positions for tool poses, one thread at a time.
 
     Args:
         arm: whose limits and kinematics count.
     """
+
+    _bound = ("_reference",)
 
     def __init__(self, arm: Arm):
         self._arm = arm
@@ -43,10 +46,10 @@ class InverseKinematics:
         middle = (low + high) / 2
         spread = np.random.default_rng(0).uniform(low, high, (_SEEDS, arm.n))
         self._seeds = [arm.home, middle, *spread]
-
-    def __reduce__(self):
-        """Pickle by setting up anew."""
-        return InverseKinematics, (self._arm,)
+        # Or the first call would compile or load in somebody's control loop.
+        anywhere = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        self._from_seed(*anywhere, np.array(arm.home))
+        self._posture(*anywhere)
 
     def posture(self, pose: Pose) -> np.ndarray:
         """Give the posture of a pose: of the joint positions that reach it, the ones nearest home.

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.copying import Unique
 from contactsafe.errors import InvalidInputError
 from contactsafe.files import readable
 from contactsafe.robot.arm import Arm
@@ -108,7 +109,7 @@ def _connect(joint: ET.Element, origin: ET.Element | None, parent: str, child: s
     ET.SubElement(joint, "child", link=child)
 
 
-class BulletPlant:
+class BulletPlant(Unique):
     """Arm, table and board in a PyBullet client of their own.
 
     Args:
@@ -124,6 +125,11 @@ class BulletPlant:
     Raises:
         InvalidInputError: pybullet is not installed, the arm has no facts, or obstacles are asked for.
     """
+
+    _why = (
+        "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they are "
+        "to run, or take the MuJoCo engine"
+    )
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from contactsafe.copying import Independent
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import BoardConfig, Camera
@@ -123,7 +124,7 @@ class _Scene:
     glare: np.ndarray  # levels added, (n, n, 3)
 
 
-class Photographer:
+class Photographer(Independent):
     """A camera over a board, with the arm in its view.
 
     Args:
@@ -135,6 +136,8 @@ class Photographer:
         homography: board plane to the photograph's pixels as calibrated, (3, 3).
         corners: of the board, (4, 2), m.
     """
+
+    _bound = ("_posed",)
 
     def __init__(self, camera: Camera, board: BoardConfig, model: mujoco.MjModel):
         scale = PHOTO_PX / camera.size
@@ -149,7 +152,7 @@ class Photographer:
         middle = PHOTO_PX / 2
         K = np.array([[fine.focal_px, 0.0, middle], [0.0, fine.focal_px, middle], [0.0, 0.0, 1.0]])
         self._projection = K @ np.column_stack([R, -R @ self._eye])
-        self._model, self._posed = model, mujoco.MjData(model)
+        self._model = model
         self._arm = np.flatnonzero(model.geom_contype == ARM_CONTYPE)
         self._is_box = model.geom_type[self._arm] == mujoco.mjtGeom.mjGEOM_BOX
         self._sizes = model.geom_size[self._arm].copy()
@@ -160,6 +163,10 @@ class Photographer:
         grain = np.random.default_rng(0).normal(128.0, _NOISE_SIGMA, (PHOTO_PX + _SPARE, PHOTO_PX + _SPARE, 3))
         self._noise = np.clip(grain, 0, 255).astype(np.uint8)
         self._scene: _Scene | None = None
+        self._bind()
+
+    def _bind(self) -> None:
+        self._posed = mujoco.MjData(self._model)
 
     def solids(self, data: mujoco.MjData) -> Solids:
         """Give the arm's shapes where they are."""

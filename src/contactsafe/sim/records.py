@@ -1,5 +1,6 @@
 """A simulated world as NumPy records: where its plant lies in memory, its sensors' errors, what a step measured."""
 
+import functools
 import math
 
 import mujoco
@@ -30,6 +31,7 @@ def noise_channels(n: int) -> int:
     return 3 * n + 9
 
 
+@functools.cache  # as for `controller_dtype`
 def plant_dtype(n: int) -> np.dtype:
     """Describe one plant: addresses for compiled code, sensor errors, the push that disturbs it."""
     return np.dtype(
@@ -105,6 +107,7 @@ report_dtype = np.dtype(
 """What one policy step measured in the simulator: for rewards, metrics and tests, never for a controller."""
 
 
+@functools.cache
 def trace_dtype(n: int) -> np.dtype:
     """Describe one tick as recorded for experiments."""
     return np.dtype(
@@ -131,12 +134,16 @@ def trace_dtype(n: int) -> np.dtype:
     )
 
 
-def fill_plant(plant, model: mujoco.MjModel, data: mujoco.MjData, arm: Arm, config: WorldConfig) -> None:
-    """Fill a `plant_dtype` record; the caller keeps model and data alive."""
+def point_plant(plant, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Tell a `plant_dtype` record where model and data lie; the caller keeps them alive."""
     plant["model"], plant["data"] = model._address, data._address
     for name in VIEWED:
         plant[name] = getattr(data, name).ctypes.data
     plant["qpos_spring"] = model.qpos_spring.ctypes.data
+
+
+def fill_plant(plant, model: mujoco.MjModel, arm: Arm, config: WorldConfig) -> None:
+    """Fill a `plant_dtype` record but for what `point_plant` does."""
     for name in ("nq", "nv", "nbody", "ngeom", "nsensordata"):
         plant[name] = getattr(model, name)
     plant["tcp_site"] = model.site(TOOL_SITE).id

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.copying import Independent
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
 from contactsafe.sim.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
@@ -21,7 +22,7 @@ CAMERAS = 16
 _CHANGED = ("body_pos", "body_quat", "body_mass", "body_inertia", "geom_friction", "geom_size")
 
 
-class Variation:
+class Variation(Independent):
     """Draws what differs and makes it so.
 
     Args:
@@ -114,17 +115,17 @@ class _Plant:
     """One world's plant as it was built, from which every draw starts."""
 
     def __init__(self, worlds: Worlds, i: int):
-        model, self._record = worlds.models[i], worlds.plants[i]
-        self._model = model
-        self._friction, self._pad_half = self._record["friction"].copy(), self._record["pad_half"].copy()
-        self._delay = int(self._record["delay_ticks"])
+        self._worlds, self._i = worlds, i  # not the record itself, which a copy of this would share with nobody
+        model, record = worlds.models[i], worlds.plants[i]
+        self._friction, self._pad_half = record["friction"].copy(), record["pad_half"].copy()
+        self._delay = int(record["delay_ticks"])
         self._board, self._tool, self._pad = model.body("board").id, model.body("tool").id, model.geom("pad").id
         self._links = [k for k in range(model.nbody) if model.body(k).name.startswith("link")]
         self._kept = {name: getattr(model, name).copy() for name in _CHANGED}
 
     def apply(self, drawn) -> None:
         """Make model and record those that were drawn."""
-        model, plant = self._model, self._record
+        model, plant = self._worlds.models[self._i], self._worlds.plants[self._i]
         for name, value in self._kept.items():
             getattr(model, name)[:] = value
         model.body_pos[self._board, 2] += drawn["board_height_m"]

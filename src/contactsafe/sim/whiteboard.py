@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
 
@@ -12,7 +13,7 @@ CLEAN, INK, OBJECT = 0, 1, 2
 """What a cell holds. An OBJECT is dark like ink in the camera's eyes, and no pad removes it."""
 
 
-class Whiteboard:
+class Whiteboard(Independent):
     """A board and its ink.
 
     Attributes:

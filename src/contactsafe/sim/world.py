@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import mujoco
@@ -12,12 +11,21 @@ from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype, fill_params, index_bounds
+from contactsafe.copying import Independent, Threads
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.ink import empty_ledger, enter
-from contactsafe.sim.records import fill_plant, noise_channels, plant_bounds, plant_dtype, report_dtype, trace_dtype
+from contactsafe.sim.records import (
+    fill_plant,
+    noise_channels,
+    plant_bounds,
+    plant_dtype,
+    point_plant,
+    report_dtype,
+    trace_dtype,
+)
 from contactsafe.sim.scene import build_plant
 from contactsafe.sim.snapshot import Part, of_array, of_generators, of_physics, of_records, put, take
 from contactsafe.sim.stepping import run_ticks
@@ -72,8 +80,10 @@ def _check_tick(controller: ControllerConfig | None) -> None:
         raise InvalidInputError(f"controller dt = {controller.dt} s; simulated worlds tick every {TICK_S} s")
 
 
-class Worlds:
+class Worlds(Independent):
     """N independent worlds, stepped in native threads.
+
+    A copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
         arm: built from facts, with a tool.
@@ -97,6 +107,8 @@ class Worlds:
         no_trace: an empty trace, for `run_worlds` and its like.
     """
 
+    _bound = ("datas",)
+
     def __init__(
         self,
         arm: Arm,
@@ -111,16 +123,15 @@ class Worlds:
         _check_tick(controller)
         self.config = self.configs[0]
         self.models = _plants(arm, self.configs, shared)
-        self.datas = [mujoco.MjData(model) for model in self.models]
         self.boards = [Whiteboard(self.config.board) for _ in range(n)]
         self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
         self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
         self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
         self.reports = np.zeros(n, dtype=report_dtype)
         self._owners = [Controller(arm, controller, self.controllers, i) for i in range(n)]
+        self._bind()
         for i in range(n):
-            self.boards[i].cells = self.cells[i]
-            fill_plant(self.plants[i], self.models[i], self.datas[i], arm, self.configs[i])
+            fill_plant(self.plants[i], self.models[i], arm, self.configs[i])
             self.plants[i]["origin"] = self.boards[i].origin
         size = self.config.camera.size
         self.masks = np.full((n, size, size), 255, dtype=np.uint8)
@@ -130,8 +141,22 @@ class Worlds:
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
-        self._threads = ThreadPoolExecutor(min(n, os.cpu_count() or 1)) if n > 1 else None
+        self._threads = Threads(min(n, os.cpu_count() or 1))
         self.seed(seed)
+
+    def _bind(self) -> None:
+        self.datas = [mujoco.MjData(model) for model in self.models]
+        for i, board in enumerate(self.boards):
+            board.cells = self.cells[i]
+            point_plant(self.plants[i], self.models[i], self.datas[i])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "physics": of_physics(self.models, self.datas).take()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        physics = state.pop("physics")
+        super().__setstate__(state)
+        of_physics(self.models, self.datas).put(physics)
 
     def use(self, controller: ControllerConfig) -> None:
         """Put another controller in charge of every world, which costs far less than worlds of its own.
@@ -160,9 +185,8 @@ class Worlds:
         mujoco.mj_resetData(model, data)
         model.qpos_spring[self.arm.n :] = model.qpos0[self.arm.n :]  # obstacles that travelled are back
         data.qpos[: self.arm.n] = q
-        self._owners[i].reset(q)
         dynamics = self.arm.dynamics(q, np.zeros(self.arm.n))
-        self.controllers[i]["dynamics"] = dynamics
+        self._owners[i].reset(q, torque=np.clip(dynamics["g"], -self.arm.tau_max, self.arm.tau_max))
         data.ctrl[:] = dynamics["g"]
         mujoco.mj_forward(model, data)
         plant["tick"], plant["push_body"], plant["obstacle_stopped"] = 0, 0, 0
@@ -217,8 +241,7 @@ class Worlds:
 
     def close(self) -> None:
         """Stop the threads."""
-        if self._threads is not None:
-            self._threads.shutdown()
+        self._threads.close()
 
     def draw_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Draw the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
@@ -228,10 +251,10 @@ class Worlds:
 
     def in_threads(self, run) -> None:
         """Call run(start, stop) over all worlds, one share a thread; errors surface here."""
-        if self._threads is None:
-            run(0, self.n)
+        if self.n == 1:
+            run(0, 1)
             return
-        workers = self._threads._max_workers
+        workers = self._threads.count
         bounds = np.linspace(0, self.n, workers + 1).astype(int)
         for future in [self._threads.submit(run, bounds[k], bounds[k + 1]) for k in range(workers)]:
             future.result()

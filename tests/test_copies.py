@@ -1,0 +1,476 @@
+"""Everything public is copied, pickled and sent to other processes whole: what goes on there shares nothing with here.
+
+`ACTORS` has an entry for every public class that is no plain record; a new one is missed by the first test.
+"""
+
+import copy
+import dataclasses
+import gc
+import importlib
+import inspect
+import multiprocessing
+import pickle
+import pkgutil
+import typing
+
+import cloudpickle
+import gymnasium
+import numpy as np
+import pytest
+
+import contactsafe as cs
+from contactsafe.control.records import controller_dtype
+from contactsafe.copying import OfTraining, Threads, Unique
+from contactsafe.envs.config import WipingConfig
+from contactsafe.envs.pushes import Pushes
+from contactsafe.envs.sampling import MaskSampler
+from contactsafe.envs.tasks import WipingTasks
+from contactsafe.envs.wiping import WipingEnv
+from contactsafe.errors import InvalidInputError
+from contactsafe.experiments.collision_scenes import draw_motion
+from contactsafe.experiments.motions import Playback
+from contactsafe.experiments.run import Run
+from contactsafe.learning.bundle import Bundle, shipped_bundle
+from contactsafe.learning.perception import Perception
+from contactsafe.learning.policy import Policy
+from contactsafe.learning.references import Chance, NearestInk, Raster
+from contactsafe.robot.dynamics import forward_kinematics
+from contactsafe.robot.ik import InverseKinematics
+from contactsafe.sim.randomisation import Randomisation
+from contactsafe.sim.whiteboard import Whiteboard
+from contactsafe.sim.world import Worlds
+
+VARIED = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes())
+RNG = np.random.default_rng(0)
+ACTIONS = RNG.uniform(-1.0, 1.0, (64, 2, 18)).astype(np.float32)
+
+
+def observation(n=2):
+    rng = np.random.default_rng(1)
+    vectors = {"pose": 6, "target": 18, "force": 3}
+    mask = np.where(rng.uniform(size=(n, 128, 128, 1)) < 0.01, 0, 255).astype(np.uint8)
+    return {**{name: 0.1 * rng.normal(size=(n, k)).astype(np.float32) for name, k in vectors.items()}, "mask": mask}
+
+
+def homography():
+    return WipingTasks().worlds.homography
+
+
+# What each does next, as arrays; called again it goes on from there.
+
+
+def evaluate_arm(arm):
+    return [arm.dynamics(arm.home, np.ones(arm.n))["M"], arm.tool_pose(arm.home).position, arm.skin]
+
+
+def evaluate_nominal(nominal):
+    found = np.zeros(3), np.zeros((3, 3)), np.zeros((6, 7))
+    forward_kinematics(nominal.handle, np.linspace(-0.5, 0.5, 7), *found)
+    return list(found)
+
+
+def solve(ik):
+    return [ik.solve(cs.Pose(np.array([0.5, 0.1, 0.2]), np.array([0.0, 1.0, 0.0, 0.0])))]
+
+
+def drive(controller):
+    """Swing about the home pose with a push: the residual, and so the torque, depends on all that was before."""
+    arm, torques = controller.arm, []
+    start = int(controller.record["state"]["ticks"])
+    target = cs.Target(arm.tool_pose(arm.home), np.full(6, 200.0))
+    for k in range(start, start + 30):
+        swing = 0.01 * np.sin(0.05 * k + np.arange(7))
+        out = controller.step(cs.Measurement(arm.home + swing, 0.5 * np.cos(0.05 * k + np.arange(7))), target)
+        torques.append(np.concatenate([out.torque, out.residual]))
+    return torques
+
+
+def run_worlds(worlds):
+    worlds.run(5)
+    return [worlds.plants["q_seen"].copy(), worlds.controllers["output"]["torque"].copy(), worlds.render().copy()]
+
+
+def run_tasks(tasks):
+    step = int(tasks.tasks["steps"][0])
+    tasks.step(ACTIONS[step, : tasks.worlds.n])
+    return [*tasks.observation().values(), tasks.reward, tasks.worlds.plants["q_seen"].copy()]
+
+
+def step_env(env):
+    step = int(env.unwrapped.tasks.tasks["steps"][0])
+    seen, reward, *_ = env.step(ACTIONS[step, 0])
+    return [*seen.values(), reward]
+
+
+def step_envs(envs):
+    step = int(envs.unwrapped.tasks.tasks["steps"][0])
+    seen, reward, *_ = envs.step(ACTIONS[step])
+    return [*seen.values(), reward]
+
+
+def vary(variation):
+    variation.draw(0, np.random.default_rng(abs(int(1e9 * variation.drawn["payload_kg"][0]))))
+    variation.look_first(0)
+    return [variation._worlds.models[0].body_mass.copy(), variation._worlds.masks.copy()]
+
+
+def push(pusher):
+    pusher._worlds.plants["tick"] += 5000
+    pusher.step()
+    return [pusher._worlds.plants["push_force"].copy()]
+
+
+def play(playback):
+    playback.step()
+    return [playback.worlds.plants["q_seen"].copy(), playback._tool.copy()]
+
+
+def draw(board):
+    board.draw_random(np.random.default_rng(board.ink_cells))
+    return [board.cells.copy()]
+
+
+def sample(sampler):
+    return list(sampler.sample(2, 0))
+
+
+def infer(bundle):
+    shapes = {"state": 27, "latent": bundle.manifest["latent_size"]}
+    inputs = {port.name: np.full((2, port.shape[1]), 0.1, np.float32) for port in bundle.policy.get_inputs()}
+    assert set(inputs) == set(shapes)
+    return bundle.policy.run(["action"], inputs)
+
+
+def act(policy):
+    return [policy.act(observation()) for _ in range(3)]
+
+
+def perceive(perception):
+    seen = observation()
+    return [perception(seen["mask"], seen["pose"])]
+
+
+def share(threads):
+    return [threads.submit(np.square, k).result() for k in range(4)]
+
+
+# How each is made, in the midst of what it does.
+
+
+def begun(make, go_on):
+    def made():
+        actor = make()
+        go_on(actor)
+        return actor
+
+    return made
+
+
+def controller():
+    made = cs.Controller(cs.robots.panda())
+    made.reset(made.arm.home)
+    return made
+
+
+def worlds(kind=Worlds):
+    made = kind(cs.robots.panda(), n=2, seed=3)
+    for i in range(2):
+        made.reset(i, made.arm.home)
+        made.boards[i].draw_random(np.random.default_rng(i))
+        made.enter_ink(i)
+    made.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 20.0, 0.0), 0.001, 1.0)
+    return made
+
+
+def tasks(config=VARIED):
+    made = WipingTasks(config, 2, 3)
+    for i in range(2):
+        made.reset(i, np.random.default_rng(i))
+    return made
+
+
+def env():
+    made = gymnasium.make("contactsafe/Wiping-v0", config=VARIED)
+    made.reset(seed=3)
+    return made
+
+
+def bare_env():
+    return env().unwrapped
+
+
+def envs():
+    made = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=2, config=VARIED)
+    made.reset(seed=3)
+    return made
+
+
+def playback():
+    arm = cs.robots.panda()
+    motions = [draw_motion(arm, 0), draw_motion(arm, 1)]
+    return Playback(Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1]), motions)
+
+
+def encoded():
+    from contactsafe.learning.observation import ObservationScaling
+    from contactsafe.learning.vec_env import EncodedVecEnv
+
+    made = envs()
+    eyes = Perception(None, "foveated", 0.64, 128, made.camera_homography, share=True)
+    scaling = ObservationScaling(("pose",), (0.0,) * (6 + eyes.latent_size), (1.0,) * (6 + eyes.latent_size))
+    made = EncodedVecEnv(made, eyes, scaling)
+    made.reset()
+    return made
+
+
+def step_encoded(vec_env):
+    return list(vec_env.step(ACTIONS[int(vec_env._steps[0])])[:2])
+
+
+def photographed():
+    pytest.importorskip("cv2")
+    return tasks(WipingConfig(sight="photograph"))
+
+
+def photographer():
+    return photographed()._sight._photographers[0]
+
+
+def take(photographer):
+    seen = photographer.solids_at(np.array(cs.robots.panda().home))
+    return [photographer.take(np.zeros((250, 300), np.uint8), seen, 1, 2)]
+
+
+def segment(segmenter):
+    return [segmenter.segment(np.full((455, 455, 3), 200, np.uint8), np.zeros((455, 455), np.uint8))]
+
+
+def plotter():
+    from contactsafe.report.plots import Plotter
+
+    return Plotter(["safe", "paper"])
+
+
+ACTORS = {
+    "Arm": (cs.robots.panda, evaluate_arm),
+    "NominalModel": (lambda: cs.robots.panda().nominal(), evaluate_nominal),
+    "InverseKinematics": (lambda: InverseKinematics(cs.robots.panda()), solve),
+    "Controller": (begun(controller, drive), drive),
+    "Worlds": (begun(worlds, run_worlds), run_worlds),
+    "Whiteboard": (lambda: Whiteboard(VARIED.world.board), draw),
+    "Variation": (lambda: tasks()._variation, vary),
+    "Pusher": (lambda: tasks()._pusher, push),
+    "WipingTasks": (begun(tasks, run_tasks), run_tasks),
+    "WipingEnv": (begun(bare_env, step_env), step_env),
+    "wrapped WipingEnv": (begun(env, step_env), step_env),
+    "WipingVectorEnv": (begun(envs, step_envs), step_envs),
+    "MaskSampler": (MaskSampler, sample),
+    "Photographer": (begun(photographer, take), take),
+    "PhotographSight": (begun(photographed, run_tasks), run_tasks),
+    "Segmenter": (lambda: photographed()._sight._segmenter, segment),
+    "Playback": (begun(playback, play), play),
+    "Bundle": (lambda: Bundle.load(shipped_bundle()), infer),
+    "Policy": (begun(lambda: Policy(shipped_bundle(), homography()), act), act),
+    "Perception": (lambda: Perception(None, "foveated", 0.64, 128, homography(), share=True), perceive),
+    "EncodedVecEnv": (begun(encoded, step_encoded), step_encoded),
+    "Raster": (begun(lambda: Raster(VARIED, 2), lambda r: [r.act(observation())]), lambda r: [r.act(observation())]),
+    "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
+    "Chance": (lambda: Chance(2, 0), lambda r: [r.act(observation())]),
+    "Threads": (begun(lambda: Threads(2), share), share),
+    "Run of a policy": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
+    "Plotter": (plotter, lambda p: [p._count]),
+}
+"""How each is made in the midst of what it does, and what it does next, as arrays."""
+
+NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
+"""PyTorch's own: it copies them."""
+
+IN_PYBULLET = {"BulletPlant", "BulletWorlds", "BulletTasks", "WipingBulletEnv", "WipingBulletVectorEnv"}
+"""Refused, see the test."""
+
+
+def public_classes():
+    for found in pkgutil.walk_packages(cs.__path__, "contactsafe."):
+        if found.name.endswith("__main__"):
+            continue
+        try:
+            module = importlib.import_module(found.name)
+        except ImportError:  # an extra that is not installed here
+            continue
+        for name, kind in inspect.getmembers(module, inspect.isclass):
+            if kind.__module__ == found.name and not name.startswith("_"):
+                yield name, kind
+
+
+def is_plain(kind):
+    """Whether a class is but data or words: a record, an error, a protocol."""
+    record = dataclasses.is_dataclass(kind) or (issubclass(kind, tuple) and hasattr(kind, "_fields"))
+    return (
+        record or issubclass(kind, BaseException) or typing.is_typeddict(kind) or getattr(kind, "_is_protocol", False)
+    )
+
+
+def test_every_public_class_has_an_entry():
+    known = {*ACTORS, *NETWORKS, *IN_PYBULLET, "Independent"}
+    missing = [
+        name for name, kind in public_classes() if not (name in known or is_plain(kind) or issubclass(kind, Unique))
+    ]
+    assert missing == [], "give each an entry in ACTORS: how to make one, and what it does next"
+
+
+def assert_same(a, b):
+    assert len(a) == len(b)
+    for one, other in zip(a, b, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+COPIES = {
+    "deep": copy.deepcopy,
+    "shallow": copy.copy,
+    "pickled": lambda actor: pickle.loads(pickle.dumps(actor)),
+    "cloudpickled": lambda actor: cloudpickle.loads(cloudpickle.dumps(actor)),
+}
+
+
+@pytest.mark.parametrize("name", ACTORS)
+def test_a_copy_goes_on_as_the_original_apart_from_it_and_outlives_it(name):
+    """The copies act first: had one moved the original, that would come out elsewhere."""
+    if name == "EncodedVecEnv":
+        pytest.importorskip("stable_baselines3")
+    make, go_on = ACTORS[name]
+    original = make()
+    copies = {way: of(original) for way, of in COPIES.items()}
+    if isinstance(original, gymnasium.Wrapper):
+        del copies["shallow"]  # Gymnasium's, not ours: what it wraps stays the same
+    outcomes = {way: go_on(copied) for way, copied in copies.items()}
+    expected = go_on(original)
+    survivor = copy.deepcopy(original)
+    next_expected = go_on(original)
+    del original, copies
+    gc.collect()
+    for outcome in outcomes.values():
+        assert_same(outcome, expected)
+    assert_same(go_on(survivor), next_expected)
+
+
+def go_on_elsewhere(actors):
+    return {name: ACTORS[name][1](actor) for name, actor in actors.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
+def test_pickled_ones_go_on_in_another_process(method):
+    actors = {name: make() for name, (make, _) in ACTORS.items() if name != "EncodedVecEnv"}
+    with multiprocessing.get_context(method).Pool(1) as pool:
+        outcomes = pool.apply_async(go_on_elsewhere, (actors,)).get(timeout=300)
+    for name, actor in actors.items():
+        assert_same(outcomes[name], ACTORS[name][1](actor))
+
+
+_INHERITED: dict = {}
+
+
+def go_on_inherited(_):
+    return go_on_elsewhere(_INHERITED)
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_forked_ones_go_on_in_the_child_and_do_not_wait_for_threads_that_stayed_behind():
+    _INHERITED.update({name: make() for name, (make, _) in ACTORS.items() if name != "EncodedVecEnv"})
+    try:
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            outcomes = pool.apply_async(go_on_inherited, (0,)).get(timeout=120)
+        for name, actor in _INHERITED.items():
+            assert_same(outcomes[name], ACTORS[name][1](actor))
+    finally:
+        _INHERITED.clear()
+
+
+def test_worlds_in_pybullet_refuse_to_be_copied():
+    pytest.importorskip("pybullet")
+    env = gymnasium.make("contactsafe/WipingBullet-v0")
+    for of in COPIES.values():
+        with pytest.raises(InvalidInputError) as caught:
+            of(env.unwrapped)
+        assert str(caught.value) == (
+            "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they "
+            "are to run, or take the MuJoCo engine"
+        )
+    env.close()
+
+
+def test_what_a_training_session_holds_open_refuses_to_be_copied():
+    for of in COPIES.values():
+        with pytest.raises(InvalidInputError) as caught:
+            of(OfTraining())
+        assert str(caught.value) == (
+            "what a training session holds open cannot be copied or pickled; go on from its checkpoint, with --resume"
+        )
+
+
+@pytest.mark.parametrize("error", [cs.ContactSafeError, InvalidInputError])
+def test_errors_come_back_from_other_processes(error):
+    assert str(pickle.loads(pickle.dumps(error("what, found, allowed, remedy")))) == "what, found, allowed, remedy"
+
+
+def test_controllers_that_share_records_are_copied_with_them():
+    arm = cs.robots.panda()
+    records = np.zeros(2, dtype=controller_dtype(arm.n))
+    pair = [cs.Controller(arm, records=records, index=i) for i in range(2)]
+    for one in pair:
+        one.reset(arm.home)
+    copied, (first, second) = copy.deepcopy((records, pair))
+    expected = drive(pair[0]), drive(pair[1])
+    assert_same(drive(first), expected[0])
+    assert_same(drive(second), expected[1])
+    assert copied["state"]["ticks"].tolist() == [30, 30]
+
+
+def test_what_a_user_hung_on_a_subclass_goes_along():
+    class Mine(WipingEnv):
+        def __init__(self):
+            super().__init__(VARIED)
+            self.seen = []
+
+    mine = Mine()
+    mine.seen.append(1)
+    copied = copy.deepcopy(mine)
+    copied.seen.append(2)
+    assert (mine.seen, copied.seen) == ([1], [1, 2])
+
+
+def test_copied_vector_environments_of_gymnasium():
+    """SyncVectorEnv is copied whole; AsyncVectorEnv makes its environments in processes of their own."""
+    envs = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=2, vectorization_mode="sync", config=WipingConfig())
+    envs.reset(seed=1)
+    copied = copy.deepcopy(envs)
+    assert_same(list(copied.step(ACTIONS[0])[0].values()), list(envs.step(ACTIONS[0])[0].values()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+def test_gymnasiums_asynchronous_environments(method):
+    kwargs = {"num_envs": 2, "config": WipingConfig()}
+    alone = gymnasium.make_vec("contactsafe/Wiping-v0", vectorization_mode="sync", **kwargs)
+    envs = gymnasium.make_vec(
+        "contactsafe/Wiping-v0", vectorization_mode="async", vector_kwargs={"context": method}, **kwargs
+    )
+    alone.reset(seed=1)
+    envs.reset(seed=1)
+    assert_same(list(envs.step(ACTIONS[0])[0].values()), list(alone.step(ACTIONS[0])[0].values()))
+    envs.close()
+
+
+@pytest.mark.slow
+@pytest.mark.train
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
+def test_stable_baselines3s_processes_take_an_environment_that_is_in_use(method):
+    """What Ray does, too: the environment itself is pickled by cloudpickle within its function."""
+    vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
+    made = env()
+    made.step(ACTIONS[0, 0])
+    envs = vec_env.SubprocVecEnv([lambda: made], start_method=method)
+    seen, *_ = envs.step(ACTIONS[1, :1])
+    for name, expected in made.step(ACTIONS[1, 0])[0].items():
+        np.testing.assert_array_equal(seen[name][0], expected)
+    envs.close()
