@@ -67,7 +67,7 @@ def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness
     """
     pushes, limits = [], []
     for out, controller, _ in collision(panda, stiffness):
-        if out.contact.in_contact and not out.limited:
+        if out.contact.in_contact and "rate" not in out.limited_by:
             pushes.append(commanded_push(controller, out))
             limits.append(float(controller.record["output"]["push_limit_nm"]))
     assert len(pushes) > 300

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.presets import safe
-from contactsafe.control.records import CONTACT, FAULTS, controller_dtype, fill_params
+from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtype, fill_params
 from contactsafe.control.tick import tick_at
 from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
@@ -49,7 +49,7 @@ class Target(NamedTuple):
         stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
         damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
         posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever way led there
-            (`InverseKinematics.posture`).
+            (`InverseKinematics.posture_near`).
     """
 
     pose: Pose
@@ -83,7 +83,9 @@ class Output(NamedTuple):
         contact: on the arm.
         residual: estimated external joint torque the law compensates, (n,), N m.
         error: x_d − x, position and rotation vector, (6,), m and rad.
-        limited: whether a torque or torque-rate limit clipped the command.
+        limited_by: what took something off the task or the command: some of 'contact' (the bound on the push along
+            it), 'tool force' (`push_tool_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range' (joint
+            range or speed); () where nothing did.
         fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
         bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
         target_late: whether no new target came for so long that the tool is brought to rest.
@@ -93,7 +95,7 @@ class Output(NamedTuple):
     contact: Contact
     residual: np.ndarray
     error: np.ndarray
-    limited: bool
+    limited_by: tuple[str, ...]
     fault: str
     bridged: int = 0
     target_late: bool = False
@@ -249,7 +251,7 @@ class Controller(Independent):
         damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
         damping = self._gain(damping, "damping", "1/s", self.config.damping_range)
         if target.posture is None:
-            posture = self._ik.posture(Pose(position, quat))
+            posture = self._ik.posture_near(Pose(position, quat), record["q_pose"].copy())
         else:
             posture = self.arm.joint_vector(target.posture, "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
@@ -292,11 +294,14 @@ class Controller(Independent):
             contact=contact,
             residual=out["residual"].copy(),
             error=out["error"].copy(),
-            limited=bool(out["limited"]),
+            limited_by=_LIMITED_BY[int(out["limited_by"])],
             fault=FAULTS[int(out["fault"])],
             bridged=int(out["bridged"]),
             target_late=bool(out["target_late"]),
         )
+
+
+_LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum_ in range(2 * max(LIMITS))]
 
 
 def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:

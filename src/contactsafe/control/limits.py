@@ -52,16 +52,21 @@ def power_limit(tau_net, M, qd, tank, power, drain_s):
         tank: level, J.
         power: steady, W.
         drain_s: s.
+
+    Returns:
+        True where anything was taken off.
     """
     allowed = power + max(tank, 0.0) / drain_s
     given = dot(tau_net, qd)
     if given <= allowed:
-        return
+        return False
     momentum = matvec_into(M, qd, stack_vector(qd.shape[0]))
     energy = dot(momentum, qd)
-    if energy > _STILL:
-        for i in range(qd.shape[0]):
-            tau_net[i] -= (given - allowed) / energy * momentum[i]
+    if energy <= _STILL:
+        return False
+    for i in range(qd.shape[0]):
+        tau_net[i] -= (given - allowed) / energy * momentum[i]
+    return True
 
 
 @compiled

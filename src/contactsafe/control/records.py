@@ -37,6 +37,18 @@ _FASTER = 5.0
 MISSING, REPEATED, OVERDUE, UNTRUE = 5, 7, 8, 9
 """Faults of measurements that last: no usable numbers, the same again, too late, in contradiction to those before."""
 
+LIMITED_BY_CONTACT, LIMITED_BY_TOOL_FORCE, LIMITED_BY_ENERGY, LIMITED_BY_RATE, LIMITED_BY_RANGE = 1, 2, 4, 8, 16
+
+LIMITS = {
+    LIMITED_BY_CONTACT: "contact",
+    LIMITED_BY_TOOL_FORCE: "tool force",
+    LIMITED_BY_ENERGY: "energy",
+    LIMITED_BY_RATE: "rate",
+    LIMITED_BY_RANGE: "range",
+}
+"""What takes something off a command: the bound on the push along a contact, the one on what the tool presses, the
+energy tank, torque and its rate, joint range and speed."""
+
 FAULTS = {
     0: "none",
     1: "a measurement is not finite or beyond what the arm can do; it was bridged by a prediction",
@@ -246,6 +258,7 @@ def _commanded(n: int) -> list[tuple]:
         ("damping_share", _f, (n,)),  # of each joint's damping in force
         ("overspeed_s", _f, (n,)),  # time beyond the speed limit, s
         ("posture_share", _f),  # of K_pose in force
+        ("share_reason", _i),  # key of LIMITS that took what is missing of it
         ("task_share", _f),  # of what pulls to the target in force, 0 … 1
     ]
 
@@ -266,7 +279,7 @@ def output_dtype(n: int) -> np.dtype:
             ("link", _i),  # 1 … n, 0 for none
             ("push_nm", _f),  # commanded push along the contact before the bound, N m
             ("push_limit_nm", _f),  # the bound in force; inf where there is none
-            ("limited", _i),  # 1 where torque or torque rate was clipped
+            ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command
             ("bridged", _i),  # ticks in a row whose measurement was predicted
             ("target_late", _i),  # 1 where no new target came for too long
             ("fault", _i),

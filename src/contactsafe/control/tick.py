@@ -49,7 +49,15 @@ from contactsafe.control.limits import (
     passive_step,
     power_limit,
 )
-from contactsafe.control.records import FREE, MISSING
+from contactsafe.control.records import (
+    FREE,
+    LIMITED_BY_CONTACT,
+    LIMITED_BY_ENERGY,
+    LIMITED_BY_RANGE,
+    LIMITED_BY_RATE,
+    LIMITED_BY_TOOL_FORCE,
+    MISSING,
+)
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
@@ -58,6 +66,9 @@ from contactsafe.robot.stack import stack_vector
 
 _BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _NO_TORQUE = 1, 2, 3, 4, 6
 _RUNAWAY = 11
+
+_WHOLE = 0.99
+"""A share of the task this large leaves nothing out that anyone would notice."""
 
 
 @compiled(nogil=True)
@@ -215,13 +226,14 @@ def _law(c, Lambda, J_bar):
     damping = matvec_t(dynamics.J, F_damping) + matvec_t(N_ct, tau_damping)
     observer_step(state.tool_force, state.step.probe_share, _tool_force(c, J_bar))
     share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
+    reason = LIMITED_BY_TOOL_FORCE if share < 1.0 else 0
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
-        _follow_share(state, params, share)
+        _follow_share(state, params, share, reason)
         tau = state.task_share * pull + damping + state.unweighed
     else:
         disturbance = matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque))
-        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share)
+        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, reason)
     return tau + dynamics.c + dynamics.g
 
 
@@ -266,13 +278,15 @@ def _tool_force(c, J_bar):
 
 
 @compiled
-def _follow_share(state, params, wanted):
-    """Let the task's share fall at once and come back slowly; fast where something pushes the arm."""
+def _follow_share(state, params, wanted, reason):
+    """Let the task's share fall at once and come back slowly, fast where something pushes the arm; say what took it."""
     if wanted < state.task_share:
-        state.task_share = wanted
+        state.task_share, state.share_reason = wanted, reason
     else:
         back = state.step.recover_share if state.holding == 0 else state.step.hold_share
         state.task_share += back * (wanted - state.task_share)
+    if state.task_share > _WHOLE:
+        state.share_reason = reason
 
 
 @compiled
@@ -285,7 +299,7 @@ def _follow_posture(state, params):
 
 
 @compiled
-def _contact_law(c, pull, damping, task_disturbance, removed, share):
+def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
     """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
 
     Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
@@ -303,9 +317,9 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share):
         compensation *= limit / push
     left = limit - max(min(push, limit), 0.0)
     pull_push = push_along(direction, M_inv, pull)
-    if pull_push > 0.0:
-        share = min(share, left / pull_push)
-    _follow_share(state, params, share)
+    if pull_push > 0.0 and left / pull_push < share:
+        share, reason = left / pull_push, LIMITED_BY_CONTACT
+    _follow_share(state, params, share, reason)
     tau = state.task_share * pull + compensation + damping + state.unweighed
     c.output.push_nm, c.output.push_limit_nm = push + pull_push, limit
     push = push_along(direction, M_inv, tau)
@@ -339,7 +353,7 @@ def _refuse_unusable(state, tau):
 
 @compiled
 def _stop_joints(c, tau_net):
-    """Keep joints in their range and below their speed limits, in place."""
+    """Keep joints in their range and below their speed limits, in place; tell whether that took anything."""
     state, dynamics, params = c.state, c.dynamics, c.params
     q, qd = state.q, state.qd
     n = q.shape[0]
@@ -350,7 +364,7 @@ def _stop_joints(c, tau_net):
         q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
         excess, intrusion,
     ):  # fmt: skip
-        return
+        return False
     brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
     rate = params.braking_rate - state.task_damping
     joint_stop_gains(
@@ -358,6 +372,7 @@ def _stop_joints(c, tau_net):
         params.joint_stop_stiffness, params.loop_delay_s, brake, spring, drag,
     )  # fmt: skip
     joint_stop_torque(tau_net, dynamics.M_inv, qd, excess, intrusion, params.joint_margin, brake, spring, drag)
+    return True
 
 
 @compiled
@@ -368,17 +383,20 @@ def _finish(c, tau):
     _refuse_unusable(state, tau)
     # What joints are stopped from is what the motors will do, not what was wanted of them.
     clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step)
+    limited_by = state.share_reason if state.task_share < 1.0 else 0
     tau -= dynamics.g + dynamics.c
-    _stop_joints(c, tau)
+    if _stop_joints(c, tau):
+        limited_by |= LIMITED_BY_RANGE
     tau += dynamics.c
-    power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s)
+    if power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s):
+        limited_by |= LIMITED_BY_ENERGY
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
         tau += joint_friction_into(params.friction, qd, state.friction)
     _refuse_unusable(state, tau)
     clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step) or clipped
-    out.limited = 1 if clipped else 0
+    out.limited_by = limited_by | LIMITED_BY_RATE if clipped else limited_by
     state.tau[:] = tau
     given = dot(tau - state.friction - dynamics.g, qd)
     state.tank_j = min(state.tank_j + step.dt * (params.tank_power_w - given), params.tank_j)

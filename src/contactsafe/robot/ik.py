@@ -76,6 +76,24 @@ class InverseKinematics(Independent):
             )
         return q
 
+    def posture_near(self, pose: Pose, q_seed) -> np.ndarray:
+        """Give `posture`, or where that rule finds none, joint positions reached straight from a seed.
+
+        In bounded time as well: a target that is streamed over the workspace is followed through the places where no
+        rule leads. There, and only there, the answer depends on the seed.
+
+        Raises:
+            InvalidInputError: as `posture`.
+            UnreachableError: neither finds any.
+        """
+        try:
+            return self.posture(pose)
+        except UnreachableError:
+            q, error = self._from_seed(*_checked_pose(pose), np.asarray(q_seed, dtype=float))
+            if not _reached(error):
+                raise
+            return q
+
     def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
         """Find joint positions within the limits that put the tool at a pose, however long it takes.
 
