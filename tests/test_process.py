@@ -17,14 +17,27 @@ SLOWLY = ["evaluate", "--episodes", "100000"]
 def started(*words, flags=(), **options):
     environment = {**os.environ, **options.pop("environment", {})}
     program = [sys.executable, *flags, "-m", "contactsafe", *words]
-    return subprocess.Popen(program, env=environment, **options)
+    return subprocess.Popen(program, env=environment, preexec_fn=_hears_control_c, **options)
+
+
+def _hears_control_c():
+    """Hear it even where a shell that started the tests in its background does not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def outcome_of(process):
+    """Wait for a process's end and give its stdout and stderr; leave nothing behind that does not end."""
+    try:
+        return process.communicate(timeout=120)
+    finally:
+        process.kill()
 
 
 def ended(*words, **options):
     """Run the program to its end; give status, stdout and stderr as bytes."""
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL} | options
     process = started(*words, **options)
-    out, err = process.communicate(timeout=300)
+    out, err = outcome_of(process)
     return process.returncode, out, err
 
 
@@ -145,7 +158,7 @@ class TestSignals:
         )
         time.sleep(after_s)
         process.send_signal(number)
-        out, err = process.communicate(timeout=300)
+        out, err = outcome_of(process)
         lines = [line for line in err.replace(b"\r", b"\n").splitlines() if line and b"boards" not in line]
         assert (process.returncode, out, lines) == (128 + number, b"", [told])
 

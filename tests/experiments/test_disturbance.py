@@ -29,7 +29,7 @@ def test_every_scenario_and_controller_is_there_with_a_recording(result):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_pushed_on_link_5_safe_strays_less_than_vices(result, mode):
-    assert error(result, 5, mode, "safe") < 0.5 * error(result, 5, mode, "vices")
+    assert error(result, 5, mode, "safe") < 0.6 * error(result, 5, mode, "vices")
 
 
 MISSED = pytest.mark.xfail(
