@@ -28,6 +28,7 @@ from contactsafe.envs.tasks import WipingTasks
 from contactsafe.envs.wiping import WipingEnv
 from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import draw_motion
+from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.run import Run
 from contactsafe.learning.bundle import Bundle, shipped_bundle
@@ -211,6 +212,21 @@ def playback():
     return Playback(Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1]), motions)
 
 
+def late_worlds():
+    arm, codes = cs.robots.panda(), np.resize([SEEN, LOST, SEEN, FROZEN], (2, 200))
+    made = LateWorlds(arm, 2 * [VARIED.world], cs.presets.safe(), [0, 1], codes, True)
+    for i in range(2):
+        made.reset(i, arm.home)
+    return made
+
+
+def late_playback():
+    arm = cs.robots.panda()
+    motions = [draw_motion(arm, 0), draw_motion(arm, 1)]
+    worlds = Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1])
+    return LatePlayback(worlds, motions, 200, 2 * [(30, 60)])
+
+
 def encoded():
     from contactsafe.learning.observation import ObservationScaling
     from contactsafe.learning.vec_env import EncodedVecEnv
@@ -269,6 +285,8 @@ ACTORS = {
     "PhotographSight": (begun(photographed, run_tasks), run_tasks),
     "Segmenter": (lambda: photographed()._sight._segmenter, segment),
     "Playback": (begun(playback, play), play),
+    "LateWorlds": (begun(late_worlds, run_worlds), run_worlds),
+    "LatePlayback": (begun(late_playback, play), play),
     "Bundle": (lambda: Bundle.load(shipped_bundle()), infer),
     "Policy": (begun(lambda: Policy(shipped_bundle(), homography()), act), act),
     "Perception": (lambda: Perception(None, "foveated", 0.64, 128, homography(), share=True), perceive),
@@ -277,7 +295,7 @@ ACTORS = {
     "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
     "Chance": (lambda: Chance(2, 0), lambda r: [r.act(observation())]),
     "Threads": (begun(lambda: Threads(2), share), share),
-    "Run of a policy": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
+    "Run": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
     "Plotter": (plotter, lambda p: [p._count]),
 }
 """How each is made in the midst of what it does, and what it does next, as arrays."""
@@ -311,7 +329,7 @@ def is_plain(kind):
 
 
 def test_every_public_class_has_an_entry():
-    known = {*ACTORS, *NETWORKS, *IN_PYBULLET, "Independent"}
+    known = {*ACTORS, *NETWORKS, *IN_PYBULLET, "Independent", "Call"}  # the last is how a model file is read
     missing = [
         name for name, kind in public_classes() if not (name in known or is_plain(kind) or issubclass(kind, Unique))
     ]

@@ -18,7 +18,7 @@ from contactsafe.copying import OfTraining
 from contactsafe.files import cannot_write
 
 
-class EventFile:
+class EventFile(OfTraining):
     """TensorBoard's log of numbers, written at once and not by a thread: a full disk is told where it is met.
 
     Args:
