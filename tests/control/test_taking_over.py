@@ -76,6 +76,24 @@ def test_before_the_first_good_measurement_the_torque_told_is_repeated(panda):
     assert_array_equal(controller.step(bad, hold(panda)).torque, torque)
 
 
+def test_the_torque_told_outlives_bad_measurements_and_another_reset(panda):
+    """Nothing was measured in between: the arm is still under the torque that was repeated."""
+    controller, torque = Controller(panda), np.linspace(-3.0, 3.0, panda.n)
+    controller.reset(panda.home, torque=torque)
+    controller.step(Measurement(np.full(panda.n, np.nan), np.zeros(panda.n)), hold(panda))
+    controller.reset(panda.home)
+    assert_array_equal(controller.record["state"]["tau"], torque)
+
+
+def test_a_sample_that_cannot_be_true_does_not_make_an_arm_seem_elsewhere(panda):
+    plant, controller = Plant(panda), controller_at(panda, presets.safe())
+    plant.push("link5", (0.0, 25.0, 0.0))
+    plant.run(controller, hold(panda), 300)
+    sent = controller.step(Measurement(plant.q + 0.9, plant.qd), hold(panda)).torque
+    controller.reset(plant.q, plant.qd)
+    assert_array_equal(controller.record["state"]["tau"], sent)
+
+
 def test_an_arm_found_elsewhere_is_taken_to_be_held_by_gravity_compensation(panda):
     """A new episode of a simulation, or an arm that was led away by hand: the last command means nothing there."""
     plant, controller = Plant(panda), controller_at(panda, presets.safe())

@@ -173,7 +173,7 @@ class Controller(Independent):
         for part in ("state", "output"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
         self.record["dynamics"] = dynamics
-        self.record["state"]["tau"] = tau
+        self.record["state"]["tau"], self.record["state"]["q_good"] = tau, q
         self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
         pose = self.arm.tool_pose(q)
         held = self.record["state"]["target"]
@@ -205,8 +205,8 @@ class Controller(Independent):
     def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
         """Give the torque that the arm is under, as far as this controller can know, (n,), N m."""
         state = self.record["state"]
-        elsewhere = np.abs(q - self.record["measurement"]["q"]) > _SAME_PLACE  # not where that was not finite
-        if state["started"] and not elsewhere.any():
+        elsewhere = np.abs(q - state["q_good"]) > _SAME_PLACE
+        if self._is_reset and not elsewhere.any():
             return state["tau"].copy()
         return dynamics["g"].copy()
 
