@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.control.plant import UNTOUCHED, controller_at, reach
+from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
 from contactsafe.control.damping import joint_damping_limits
@@ -193,3 +193,17 @@ def test_what_pushes_inwards_is_left_and_helped(push, depth):
 def test_nothing_jumps_where_the_margin_begins(tau, beyond):
     """At rest; in motion the brake has come in long before."""
     assert_allclose(stop([tau, 0.0], [-1.9 - beyond, -2.0], [0.0, 0.0])[0], tau, rtol=0, atol=1e-5)
+
+
+def test_friction_above_a_tick_of_torque_rate_was_added_up(panda, quick_panda):
+    """A motion well within the torque rate is commanded alike whether the rate is limited or not."""
+    wanted = []
+    for arm in (panda, quick_panda):
+        arm = replace(arm, friction=arm.friction * [3.0, 1.0, 1.0])
+        controller, q, torques = controller_at(arm, presets.vices()), panda.home.copy(), []
+        for tick in range(600):
+            qd = 0.4 * np.sin(0.01 * tick) * np.array([1.0, -0.5, 1.0, 1.0, -1.0, 0.5, 1.0])
+            q = q + 0.001 * qd
+            torques.append(controller.step(Measurement(q, qd, UNTOUCHED), hold(panda, q)).torque)
+        wanted.append(torques)
+    assert_allclose(wanted[0], wanted[1], rtol=0, atol=1e-9)

@@ -382,7 +382,7 @@ def _finish(c, tau):
     qd, step = state.qd, state.step
     _refuse_unusable(state, tau)
     # What joints are stopped from is what the motors will do, not what was wanted of them.
-    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step)
+    clipped = limit_torque(tau, state.tau - state.friction, params.tau_max, step.torque_step)
     limited_by = state.share_reason if state.task_share < 1.0 else 0
     tau -= dynamics.g + dynamics.c
     if _stop_joints(c, tau):
