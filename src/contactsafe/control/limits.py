@@ -12,6 +12,9 @@ from contactsafe.robot.stack import stack_matrix, stack_vector
 _STILL = 1e-12
 """Twice the energy of an arm that stands still, J: no torque gives it any power worth the name."""
 
+_RELEASE_RAD_S2 = 100.0
+"""Acceleration by which a joint may be let go when its own torque is taken off, rad/s²."""
+
 _FADE_RAD_S = 0.4
 """Excess of speed at which nothing pushes a joint on any more, rad/s."""
 
@@ -161,8 +164,9 @@ def joint_stop_torque(tau_net, M_inv, qd, excess, intrusion, margin, brake, spri
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
     What is too fast is braked, and what pushes it on fades; within the margin a spring pushes back, damped on the way
-    out as well. What pushes a joint on is the acceleration that the whole command gives it, as a torque of its own,
-    (M⁻¹ τ)_i/(M⁻¹)_ii: on a chain of parallel axes its own torque may hold it against all the others'.
+    out as well. What pushes a joint on is its own torque, or the acceleration that the whole command gives it, as a
+    torque of its own, (M⁻¹ τ)_i/(M⁻¹)_ii, whichever is more. Its own counts up to `_RELEASE_RAD_S2` of the inertia that
+    the joint moves alone: on a chain of parallel axes it may be just what holds the joint against all the others.
 
     Args:
         tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
@@ -177,14 +181,16 @@ def joint_stop_torque(tau_net, M_inv, qd, excess, intrusion, margin, brake, spri
     for i in range(qd.shape[0]):
         if excess[i] == 0.0 and intrusion[i] == 0.0:
             continue
-        push = dot(M_inv[i], tau_net) / M_inv[i, i]
-        change = 0.0
+        inertia = 1.0 / M_inv[i, i]
+        push, change = inertia * dot(M_inv[i], tau_net), 0.0
         if excess[i] != 0.0:
             way = 1.0 if excess[i] > 0.0 else -1.0
-            change = -way * max(way * push, 0.0) * min(way * excess[i] / _FADE_RAD_S, 1.0) - brake[i] * excess[i]
+            on = max(min(way * tau_net[i], _RELEASE_RAD_S2 * inertia), way * push, 0.0)
+            change = -way * on * min(way * excess[i] / _FADE_RAD_S, 1.0) - brake[i] * excess[i]
         if intrusion[i] != 0.0:
             out = 1.0 if intrusion[i] > 0.0 else -1.0
-            change -= out * max(out * (push + change), 0.0) * min(out * intrusion[i] / margin, 1.0)
+            on = max(min(out * (tau_net[i] + change), _RELEASE_RAD_S2 * inertia), out * (push + change), 0.0)
+            change -= out * on * min(out * intrusion[i] / margin, 1.0)
             change -= spring[i] * intrusion[i] + out * drag[i] * min(out * qd[i], 0.0)
         tau_net[i] += change
 

@@ -381,9 +381,9 @@ def _finish(c, tau):
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     qd, step = state.qd, state.step
     _refuse_unusable(state, tau)
-    # What joints are stopped from is what the motors will do, not what was wanted of them.
-    clipped = limit_torque(tau, state.tau - state.friction, params.tau_max, step.torque_step)
     limited_by = state.share_reason if state.task_share < 1.0 else 0
+    # Joints are stopped from what the motors can do, not from what is wanted of them.
+    clipped = limit_torque(tau, tau, params.tau_max, step.torque_step)
     tau -= dynamics.g + dynamics.c
     if _stop_joints(c, tau):
         limited_by |= LIMITED_BY_RANGE
