@@ -217,8 +217,8 @@ def _reset(worlds: LateWorlds, controller: ControllerConfig) -> list[float]:
     torques = [worlds.controllers["output"]["torque"].copy()]
     arm = worlds.arm
     owners = [Controller(arm, controller, worlds.controllers, i) for i in range(worlds.n)]
-    for owner, data in zip(owners, worlds.datas, strict=True):
-        owner.reset(np.clip(data.qpos[: arm.n], arm.q_min, arm.q_max))
+    for owner, data, sent in zip(owners, worlds.datas, torques[0], strict=True):
+        owner.reset(np.clip(data.qpos[: arm.n], arm.q_min, arm.q_max), data.qvel[: arm.n], sent)
     for _ in range(_BACK_TICKS):
         worlds.run(1)
         torques.append(worlds.controllers["output"]["torque"].copy())
