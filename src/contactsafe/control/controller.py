@@ -5,19 +5,27 @@ from typing import NamedTuple
 import numpy as np
 
 from contactsafe.control.config import ControllerConfig
+from contactsafe.control.load import payload_weight_into, take_up
 from contactsafe.control.presets import safe
-from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtype, fill_params
+from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtype, fill_params, mass_variance
 from contactsafe.control.tick import tick_at
 from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.payload import NOTHING, Payload, carrying, checked_payload
 
 RANGE_TOLERANCE = 0.02
 """Joints may be measured this far past their limit at reset, rad: simulators' limits are soft, and encoders are off."""
 
 _HELD_STIFFNESS = 150.0
 """With which the present pose is held from a reset until a target is given, 1/s²."""
+
+_STILL_RAD_S = 0.15
+"""Joints that are faster show friction and inertia as well as weight."""
+
+_LEAST_KG = 0.01
+"""A load that weighs less is none."""
 
 _SAME_PLACE = 0.5
 """An arm that is less than this away from where it was last measured, rad, may have got there by itself."""
@@ -85,7 +93,7 @@ class Output(NamedTuple):
         error: x_d − x, position and rotation vector, (6,), m and rad.
         limited_by: what took something off the task or the command: some of 'contact' (the bound on the push along
             it), 'tool force' (`push_tool_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range' (joint
-            range or speed); () where nothing did.
+            range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
         fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
         bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
         target_late: whether no new target came for so long that the tool is brought to rest.
@@ -132,6 +140,7 @@ class Controller(Independent):
         _warm_up(arm, config)
         self.arm = arm
         self.config = config
+        self._loaded = arm
         self._nominal = arm.nominal()
         self._ik = InverseKinematics(arm)
         self._records = np.zeros(1, dtype=controller_dtype(arm.n)) if records is None else records
@@ -168,7 +177,7 @@ class Controller(Independent):
         """
         q = self._in_range(self.arm.joint_vector(q, "q"))
         qd = np.zeros(self.arm.n) if qd is None else self.arm.joint_vector(qd, "qd")
-        dynamics = self.arm.dynamics(q, qd)
+        dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else self._within_limit(torque)
         for part in ("state", "output"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
@@ -183,6 +192,73 @@ class Controller(Independent):
         self.record["target"] = held
         self._last_target = None
         self._is_reset = True
+
+    @property
+    def payload(self) -> Payload:
+        """What the tool is known to carry."""
+        known = self.record["payload"]
+        return Payload(float(known["mass"]), known["com"].copy(), known["inertia"].copy())
+
+    def set_payload(self, mass, com=None, inertia=None, in_wrench: bool | None = None) -> None:
+        """Say what the tool carries from now on, beside what the arm's model has: all of it, at rest or amid a motion.
+
+        It is held until the next call, a reset included. The command follows within the torque rate; a load that the
+        observer has felt so far is no longer a contact.
+
+        Args:
+            mass: kg; 0 for nothing.
+            com: its centre of mass in the tool's frame, (3,), m; None for the tool point.
+            inertia: about that, in the tool's axes, (3, 3), kg m²; None for a point.
+            in_wrench: whether `wrench_ee` has its weight in it, as that of a sensor in the wrist that was told nothing;
+                then it is taken off. None to look: whether more than half of it shows now. Whoever calls before the
+                load hangs free says so.
+
+        Raises:
+            InvalidInputError: what no body has, or more than the motors hold where the arm is.
+        """
+        load, before = checked_payload(mass, com, inertia), self.payload
+        loaded = carrying(self.arm, load)
+        q = self.record["state"]["q_good"] if self._is_reset else self.arm.home
+        over = np.abs(loaded.dynamics(q, np.zeros(self.arm.n))["g"]) / self.arm.tau_max
+        if load.mass > before.mass and over.max() > 1.0:
+            i = int(np.argmax(over))
+            raise InvalidInputError(
+                f"mass = {load.mass:g} kg asks {over[i] * self.arm.tau_max[i]:.4g} N m of joint "
+                f"'{self.arm.model.joint(i).name}' here, which has {self.arm.tau_max[i]:g}; give what the arm can carry"
+            )
+        gravity, rotation = self.record["handle"]["gravity"], self.record["dynamics"]["rotation"]
+        weight = payload_weight_into(self._records["payload"][self._index], rotation, gravity, np.zeros(6))
+        self._loaded, self._nominal = loaded, loaded.nominal()
+        known = self.record["payload"]
+        known["mass"], known["com"], known["inertia"] = load
+        known["in_wrench"] = self._shows(load, gravity) if in_wrench is None else bool(in_wrench)
+        self.record["handle"] = self._nominal.handle
+        self.record["params"]["mass_variance"] = mass_variance(self.config, loaded)
+        if self.record["state"]["started"]:
+            take_up(self._ticked, self._index, weight)
+
+    def _shows(self, load: Payload, gravity: np.ndarray) -> bool:
+        measured = self.record["measurement"]
+        shown = float(measured["wrench_ee"][:3] @ gravity)
+        return bool(measured["has_wrench"] and load.mass > 0.0 and shown > 0.5 * load.mass * float(gravity @ gravity))
+
+    def payload_estimate(self) -> Payload | None:
+        """Give what the tool seems to carry, all of it, as weighed while the arm hardly moved; `set_payload` takes it.
+
+        The torques of one posture say nothing of how far above or below the tool point the load is: there its centre
+        stays at the point, until another posture tells. What presses down on the tool is not told from a load.
+
+        Returns:
+            Without inertia, which weighing does not tell; None where nothing weighs otherwise than what is known, or
+            the arm moves.
+        """
+        state, known = self.record["state"], self.payload
+        if not state["loaded"] or np.abs(state["qd"]).max() > _STILL_RAD_S:
+            return None
+        mass = max(known.mass + float(state["load"][0]), 0.0)
+        if mass < _LEAST_KG:
+            return NOTHING
+        return Payload(mass, (known.mass * known.com + state["load"][1:]) / mass, np.zeros((3, 3)))
 
     def _in_range(self, q: np.ndarray) -> np.ndarray:
         past = self._past_limits(q)

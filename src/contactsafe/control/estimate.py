@@ -19,11 +19,15 @@ from contactsafe.robot.stack import stack_vector
 _SIGMAS = 3.0
 """A contact is what exceeds this many standard deviations of the weight that is not known yet."""
 
-_CORRELATED = 10.0
+CORRELATED = 10.0
 """Readings of one joint's residual, a few ms apart, err alike: so many of them count as one."""
 
-_NOISE_NM = 0.15
-_FORGET_S = 8.0
+NOISE_NM = 0.15
+"""Standard deviation of a residual beside what friction, inertia and delay come to."""
+
+FORGET_S = 8.0
+"""Time after which what was weighed is as uncertain as before."""
+
 _SETTLE_TICKS = 40
 
 _GAP = 0.3
@@ -39,8 +43,7 @@ def start(c):
     state.tank_j = params.tank_j
     state.K_task[:] = state.target.K_task
     state.D_task[:] = state.target.D_task
-    for j in range(state.mass_error.shape[0]):
-        state.mass_covariance[j, j] = params.mass_variance[j]
+    expect_masses(c)
     for i in range(state.gravity_sigma.shape[0]):
         state.gravity_sigma[i] = _gravity_sigma(c, i)
     momentum_into(dynamics.M, state.qd, state.momentum)
@@ -50,6 +53,16 @@ def start(c):
         # once, so that the first raw external torque is zero.
         state.friction[i] = state.tau[i] - state.beta[i]
         state.tau_before[i] = state.tau[i]
+
+
+@compiled
+def expect_masses(c):
+    """Begin to weigh the links anew."""
+    state = c.state
+    state.mass_error[:] = 0.0
+    state.mass_covariance[:] = 0.0
+    for j in range(state.mass_error.shape[0]):
+        state.mass_covariance[j, j] = c.params.mass_variance[j]
 
 
 @compiled
@@ -190,19 +203,17 @@ def weigh_links(c):
     state, params, dynamics = c.state, c.params, c.dynamics
     if not params.mass_variance.any():
         return
-    n = state.tau.shape[0]
     i = state.turn
-    state.turn = (i + 1) % n
     row = dynamics.mass_regressor[i]
     for j in range(row.shape[0]):
-        forgotten = state.mass_covariance[j, j] + params.mass_variance[j] * state.step.dt / _FORGET_S
+        forgotten = state.mass_covariance[j, j] + params.mass_variance[j] * state.step.dt / FORGET_S
         state.mass_covariance[j, j] = min(forgotten, params.mass_variance[j])
     told = c.state.has_wrench != 0
     state.ticks += 1
     if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
-        error = _NOISE_NM + state.unknown[i]
+        error = NOISE_NM + state.unknown[i]
         largest = _SIGMAS * np.sqrt(params.mass_variance)
-        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], _CORRELATED * error * error, largest)
+        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], CORRELATED * error * error, largest)
     state.gravity_sigma[i] = _gravity_sigma(c, i)
 
 

@@ -34,10 +34,14 @@ _TURNS_RAD = 1e4
 _FASTER = 5.0
 """Multiple of a joint's speed limit at which its measured speed is not believed."""
 
+LOAD = 10
+"""Fault of a load that keeps the tool from its target."""
+
 MISSING, REPEATED, OVERDUE, UNTRUE = 5, 7, 8, 9
 """Faults of measurements that last: no usable numbers, the same again, too late, in contradiction to those before."""
 
 LIMITED_BY_CONTACT, LIMITED_BY_TOOL_FORCE, LIMITED_BY_ENERGY, LIMITED_BY_RATE, LIMITED_BY_RANGE = 1, 2, 4, 8, 16
+LIMITED_BY_LOAD = 32
 
 LIMITS = {
     LIMITED_BY_CONTACT: "contact",
@@ -45,9 +49,10 @@ LIMITS = {
     LIMITED_BY_ENERGY: "energy",
     LIMITED_BY_RATE: "rate",
     LIMITED_BY_RANGE: "range",
+    LIMITED_BY_LOAD: "load",
 }
 """What takes something off a command: the bound on the push along a contact, the one on what the tool presses, the
-energy tank, torque and its rate, joint range and speed."""
+energy tank, torque and its rate, joint range and speed; and whether it was a load that did."""
 
 FAULTS = {
     0: "none",
@@ -60,6 +65,7 @@ FAULTS = {
     7: "the measurement did not change for over 20 ticks of motion; the arm was braked until reset",
     8: "over 20 ticks passed between two measurements; the arm was braked until reset",
     9: "measurements contradicted each other, or went on elsewhere, for over 20 ticks; the arm was braked until reset",
+    10: "a load that the controller was not told of keeps the tool below its target; see payload_estimate()",
     11: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
 }
 """What `fault` in the state and output means; the first one is latched until reset, but 5 and 7 … 9 replace it."""
@@ -137,12 +143,23 @@ def params_dtype(n: int) -> np.dtype:
     )
 
 
+payload_dtype = np.dtype(
+    [
+        ("mass", _f),  # kg
+        ("com", _f, (3,)),  # in the tool's frame, m
+        ("inertia", _f, (3, 3)),  # about it, in the tool's axes, kg m²
+        ("in_wrench", _i),  # 1 where the measured wrench has its weight in it
+    ]
+)
+"""What the tool is known to carry; the handle's model has it."""
+
+
 def state_dtype(n: int) -> np.dtype:
     """Describe what a controller remembers from tick to tick."""
     return np.dtype(
         [
             ("started", _i),  # 0 before the first tick after a reset
-            ("turn", _i),  # joint whose residual is weighed next
+            ("turn", _i),  # joint whose torque is weighed next
             ("ticks", _i),  # since reset
             ("fault", _i),  # first fault since reset
             *_clocked(n),
@@ -210,6 +227,14 @@ def _estimated(n: int) -> list[tuple]:
         ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool, as found by weighing
         ("mass_covariance", _f, (n + 1, n + 1)),
         ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
+        ("payload_momentum", _f, (6,)),  # of the known payload at the last good measurement, kg m/s and kg m²/s
+        ("load", _f, (4,)),  # that the tool carries beyond it: mass, and mass times centre in its frame, kg and kg m
+        ("load_covariance", _f, (4, 4)),
+        ("load_torque", _f),  # smoothed square of what acts from outside, in units of its error
+        ("load_left", _f),  # the same of what the load does not explain
+        ("slow_s", _f),  # time since a joint was fast, s
+        ("loaded", _i),  # 1 where what acts is such a load
+        ("sags_s", _f),  # time for which it has kept the tool below its target, s
     ]
 
 
@@ -294,6 +319,7 @@ def controller_dtype(n: int) -> np.dtype:
         [
             ("handle", handle_dtype),
             ("params", params_dtype(n)),
+            ("payload", payload_dtype),
             ("state", state_dtype(n)),
             ("measurement", measurement_dtype(n)),
             ("target", target_dtype(n)),
@@ -341,7 +367,7 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["posture_in_contact"] = 0.0 if config.recover_s > 0 else 1.0
     params["probe_share"] = share_per_tick(config.probe_s, dt)
     params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
-    params["mass_variance"] = _mass_variance(config, arm)
+    params["mass_variance"] = mass_variance(config, arm)
     params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
     params["K_pose"] = _per_joint(config.K_pose, arm.n)
     # A spring that acts late drives what it holds, as a damper of −K τ would: put in twice that at least.
@@ -372,8 +398,8 @@ def share_per_tick(time_constant_s: float, dt: float) -> float:
     return 1.0 - math.exp(-dt / time_constant_s) if time_constant_s > 0 else 1.0
 
 
-def _mass_variance(config: ControllerConfig, arm: Arm) -> np.ndarray:
-    """Variance of the relative mass error of each link and of the tool, (n + 1,)."""
+def mass_variance(config: ControllerConfig, arm: Arm) -> np.ndarray:
+    """Give the variance of the relative mass error of each link and of the tool, (n + 1,)."""
     model = arm.model
     tool_kg = float(model.body_mass[int(model.jnt_bodyid[0]) + arm.n :].sum())
     variance = np.full(arm.n + 1, config.mass_uncertainty**2)

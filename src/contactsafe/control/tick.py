@@ -49,10 +49,12 @@ from contactsafe.control.limits import (
     passive_step,
     power_limit,
 )
+from contactsafe.control.load import expect_load, take_off_payload, weigh_load
 from contactsafe.control.records import (
     FREE,
     LIMITED_BY_CONTACT,
     LIMITED_BY_ENERGY,
+    LIMITED_BY_LOAD,
     LIMITED_BY_RANGE,
     LIMITED_BY_RATE,
     LIMITED_BY_TOOL_FORCE,
@@ -75,8 +77,8 @@ _WHOLE = 0.99
 def control_tick(c):
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
-    Order: measurement and time, nominal dynamics, observer, supervisor, law, push bound, joint stops, energy, friction,
-    limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
+    Order: measurement and time, nominal dynamics, observer, supervisor, weighing, law, push bound, joint stops, energy,
+    friction, limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
     """
     state, usable = c.state, is_usable(c)
     if not usable:
@@ -87,9 +89,11 @@ def control_tick(c):
     receive(c, usable)
     _accept_target(c)
     update_dynamics(c.handle, state.q, state.qd, c.dynamics)
+    take_off_payload(c)
     correct_gravity(c)
     if state.started == 0:
         start(c)
+        expect_load(state)
     stop_late_target(c)
     Lambda, J_M_inv = task_inertia(
         c.dynamics.J, c.dynamics.M_inv, c.params.manipulability_floor, c.params.manipulability_damping
@@ -102,6 +106,7 @@ def control_tick(c):
         part_tool_from_arm(c, J_bar)
         supervise(c)
         weigh_links(c)
+        weigh_load(c)
         _watch_speed(c)
         state.since = 0.0
     set_step(c, state.elapsed)
@@ -382,6 +387,8 @@ def _finish(c, tau):
     qd, step = state.qd, state.step
     _refuse_unusable(state, tau)
     limited_by = state.share_reason if state.task_share < 1.0 else 0
+    if state.loaded != 0 and state.task_share < _WHOLE:
+        limited_by |= LIMITED_BY_LOAD
     # Joints are stopped from what the motors can do, not from what is wanted of them.
     clipped = limit_torque(tau, tau, params.tau_max, step.torque_step)
     tau -= dynamics.g + dynamics.c
