@@ -9,12 +9,13 @@ from contactsafe.envs import register as _register
 from contactsafe.errors import ContactSafeError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.payload import Payload
 
 _register()
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Arm", "Contact", "ContactSafeError", "Controller", "ControllerConfig", "Measurement", "Output", "Pose", "Target",
-    "presets", "robots",
+    "Arm", "Contact", "ContactSafeError", "Controller", "ControllerConfig", "Measurement", "Output", "Payload",
+    "Pose", "Target", "presets", "robots",
 ]  # fmt: skip

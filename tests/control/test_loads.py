@@ -40,7 +40,7 @@ class Loaded(Plant):
 
 
 def wrench_of(plant, sensor):
-    """Give what a sensor of this kind says: none, one that shows contact alone, one in the wrist that was told nothing."""
+    """Give what no sensor, one that shows contact alone, and one in the wrist that was told nothing say."""
     return plant.in_the_wrist() if sensor == "wrist" else {"none": None, "contact only": UNTOUCHED}[sensor]
 
 
