@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import STIFFNESS, Plant, controller_at, hold, reach
 
 from contactsafe import Controller, Measurement, Pose, Target, presets
+from contactsafe.control.records import controller_dtype
 from contactsafe.errors import InvalidInputError, UnreachableError
 
 
@@ -22,6 +23,31 @@ def refusal(call, *arguments, error=InvalidInputError):
 
 def test_arm_of_the_wrong_kind():
     assert refusal(Controller, "panda") == "arm is str; give an Arm such as contactsafe.robots.panda()"
+
+
+@pytest.mark.parametrize("given", [None, (np.zeros(7), np.zeros(7)), "still"])
+def test_measurement_of_the_wrong_kind(panda, controller, given):
+    assert refusal(controller.step, given).endswith("give a contactsafe.Measurement")
+
+
+@pytest.mark.parametrize(
+    "given", [("pose", STIFFNESS), Target(None, STIFFNESS), Target(([0, 0, 0], [1, 0, 0, 0]), STIFFNESS)]
+)
+def test_target_of_the_wrong_kind(panda, controller, given):
+    assert "give a contactsafe." in refusal(controller.step, Measurement(panda.home, np.zeros(7)), given)
+
+
+@pytest.mark.parametrize("index", [-1, 2, 1.5, [0], None])
+def test_a_place_that_is_not_there(panda, index):
+    records = np.zeros(2, dtype=controller_dtype(7))
+    assert "is no place in 2 records" in refusal(Controller, panda, None, records, index)
+
+
+def test_records_that_no_controller_can_live_in(panda):
+    frozen = np.zeros(2, dtype=controller_dtype(7))
+    frozen.flags.writeable = False
+    for records in (frozen, np.zeros((1, 2), dtype=controller_dtype(7)), np.zeros(2, dtype=controller_dtype(6)), []):
+        assert "controller_dtype(7)" in refusal(Controller, panda, None, records)
 
 
 def test_config_of_the_wrong_kind(panda):
@@ -74,6 +100,10 @@ def test_a_joint_that_stands_a_little_past_its_limit_is_no_obstacle(panda, past,
         ({"q": np.zeros(6)}, "q has shape (6,); give 7 numbers"),
         ({"qd": 0.0}, "qd has shape (); give 7 numbers"),
         ({"wrench_ee": np.zeros(3)}, "wrench_ee has shape (3,); give 6 numbers"),
+        ({"q": "up"}, "q is str, not numbers; give 7 finite numbers"),
+        ({"q": np.ones(7) * 1j}, "q is ndarray, not numbers; give 7 finite numbers"),
+        ({"qd": [[0.0], 1.0]}, "qd is list, not numbers; give 7 finite numbers"),
+        ({"time": 10**400}, "time is int, not a number; give seconds"),
     ],
 )
 def test_measurement_of_the_wrong_shape(panda, controller, changed, text):
@@ -158,8 +188,9 @@ def test_a_target_that_stays_as_it_is_costs_no_search(panda, monkeypatch):
     controller, target = controller_at(panda, presets.safe()), changeable(panda)._replace(posture=None)
     measured = Measurement(panda.home, np.zeros(7))
     controller.step(measured, target)
-    monkeypatch.setattr(controller, "set_target", lambda target: pytest.fail("it was checked again"))
+    monkeypatch.setattr(controller._ik, "posture_near", lambda *asked: pytest.fail("it was searched again"))
     controller.step(measured, target)
+    controller.step(measured, target._replace(pose=Pose(target.pose.position.copy(), target.pose.quat.copy())))
 
 
 def test_pose_out_of_reach_without_a_posture(panda, controller):

@@ -140,6 +140,50 @@ def test_a_known_load_is_no_contact_in_motion(panda, sensor):
         assert "tool force" not in out.limited_by
 
 
+@pytest.mark.parametrize("every", [2, 10])
+def test_a_known_load_was_a_contact_where_the_force_sensor_is_slower_than_the_loop(panda, every):
+    plant, controller = Loaded(panda, 3.0), Controller(panda, SAFE)
+    controller.set_payload(3.0, COM, INERTIA, in_wrench=True)
+    controller.reset(panda.home)
+    home = panda.tool_pose(panda.home)
+    for k in range(1500):
+        offset = 0.05 * np.sin(np.array([k / 150, k / 230, k / 190]))
+        target = hold(panda)._replace(pose=Pose(home.position + offset, home.quat))
+        wrench = plant.in_the_wrist() if k % every == 0 else None
+        out = controller.step(Measurement(plant.q, plant.qd, wrench), target)
+        plant.step(out.torque)
+        assert not out.contact.in_contact
+
+
+def test_a_load_told_while_measurements_are_missing_is_no_contact(panda):
+    plant, controller = Loaded(panda, 2.0), controller_at(panda, SAFE)
+    settle(plant, controller, hold(panda), 1000, "contact only")
+    blind = Measurement(np.full(7, np.nan), np.full(7, np.nan), UNTOUCHED)
+    for k in range(10):
+        if k == 5:
+            controller.set_payload(2.0, COM, INERTIA)
+        plant.step(controller.step(blind, hold(panda)).torque)
+    outs = settle(plant, controller, hold(panda), 300, "contact only")
+    assert max(np.abs(out.residual).max() for out in outs[100:]) < 0.5
+
+
+def test_what_a_sensor_showed_before_a_reset_has_no_say(panda):
+    controller = controller_at(panda, SAFE)
+    controller.step(Measurement(panda.home, np.zeros(7), np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0])), hold(panda))
+    controller.reset(panda.home)
+    controller.set_payload(2.0)
+    assert controller.record["payload"]["in_wrench"] == 0
+
+
+def test_an_estimate_is_the_callers_to_change(panda):
+    plant, controller = Plant(panda), Controller(panda, SAFE)
+    controller.set_payload(1.0)
+    controller.reset(panda.home)
+    settle(plant, controller, hold(panda), 1500)
+    controller.payload_estimate().com[0] = 7.0
+    assert controller.payload_estimate().com[0] == 0.0
+
+
 def test_a_push_sideways_or_from_below_is_no_load(panda):
     for force in ((25.0, 0.0, 0.0), (0.0, 25.0, 0.0), (0.0, 0.0, 25.0)):
         plant, controller = Plant(panda), controller_at(panda, SAFE)
@@ -192,12 +236,17 @@ def test_a_load_outlives_a_reset_and_is_copied_along(panda):
         ((1.0, None, np.diag([1.0, 0.1, 0.1])), "moments"),
         ((1.0, None, np.triu(np.ones((3, 3)))), "symmetric"),
         ((0.0, None, np.eye(3)), "mass is 0"),
+        ((1.0, None, 2.0 * np.eye(3)), "within 1 m"),
+        ((1.0, [1.5, 0.0, 0.0]), "tool point"),
         ((50.0,), "N m of joint"),
+        ((2.0, [0.7, 0.0, 0.7]), "N m of joint"),
+        ((1.0, None, None, "no"), "in_wrench"),
+        ((1.0, None, None, np.array([True, False])), "in_wrench"),
     ],
 )
 def test_what_no_tool_carries_is_refused_and_nothing_changes(panda, given, told):
     controller = controller_at(panda, SAFE)
-    controller.set_payload(0.5)
+    controller.set_payload(3.0)
     before = controller.record.copy()
     with pytest.raises(InvalidInputError, match=told) as refused:
         controller.set_payload(*given)

@@ -11,9 +11,9 @@ from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtyp
 from contactsafe.control.tick import tick_at
 from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
-from contactsafe.robot.arm import Arm, Pose, finite_array
+from contactsafe.robot.arm import Arm, Pose, finite_array, real_array
 from contactsafe.robot.ik import InverseKinematics
-from contactsafe.robot.payload import NOTHING, Payload, carrying, checked_payload
+from contactsafe.robot.payload import Payload, carrying, checked_payload
 
 RANGE_TOLERANCE = 0.02
 """Joints may be measured this far past their limit at reset, rad: simulators' limits are soft, and encoders are off."""
@@ -143,11 +143,9 @@ class Controller(Independent):
         self._loaded = arm
         self._nominal = arm.nominal()
         self._ik = InverseKinematics(arm)
-        self._records = np.zeros(1, dtype=controller_dtype(arm.n)) if records is None else records
-        self._index = index
+        self._records, self._index = _slot(arm, records, index)
         self._bind()
         fill_params(self.record["params"], config, arm)
-        self._last_target: Target | None = None
         self._last_numbers: list = []
         self._is_reset = False
 
@@ -179,7 +177,7 @@ class Controller(Independent):
         qd = np.zeros(self.arm.n) if qd is None else self.arm.joint_vector(qd, "qd")
         dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else self._within_limit(torque)
-        for part in ("state", "output"):
+        for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
         self.record["dynamics"] = dynamics
         self.record["state"]["tau"], self.record["state"]["q_good"] = tau, q
@@ -190,7 +188,7 @@ class Controller(Independent):
         held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.stiffness_range)
         held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.damping_range)
         self.record["target"] = held
-        self._last_target = None
+        self._last_numbers = []
         self._is_reset = True
 
     @property
@@ -216,16 +214,11 @@ class Controller(Independent):
         Raises:
             InvalidInputError: what no body has, or more than the motors hold where the arm is.
         """
-        load, before = checked_payload(mass, com, inertia), self.payload
+        load = checked_payload(mass, com, inertia)
+        if not (in_wrench is None or isinstance(in_wrench, bool | np.bool_)):
+            raise InvalidInputError(f"in_wrench = {in_wrench!r} is no answer; give True, False or None")
         loaded = carrying(self.arm, load)
-        q = self.record["state"]["q_good"] if self._is_reset else self.arm.home
-        over = np.abs(loaded.dynamics(q, np.zeros(self.arm.n))["g"]) / self.arm.tau_max
-        if load.mass > before.mass and over.max() > 1.0:
-            i = int(np.argmax(over))
-            raise InvalidInputError(
-                f"mass = {load.mass:g} kg asks {over[i] * self.arm.tau_max[i]:.4g} N m of joint "
-                f"'{self.arm.model.joint(i).name}' here, which has {self.arm.tau_max[i]:g}; give what the arm can carry"
-            )
+        self._refuse_overload(load, loaded)
         gravity, rotation = self.record["handle"]["gravity"], self.record["dynamics"]["rotation"]
         weight = payload_weight_into(self._records["payload"][self._index], rotation, gravity, np.zeros(6))
         self._loaded, self._nominal = loaded, loaded.nominal()
@@ -236,6 +229,19 @@ class Controller(Independent):
         self.record["params"]["mass_variance"] = mass_variance(self.config, loaded)
         if self.record["state"]["started"]:
             take_up(self._ticked, self._index, weight)
+
+    def _refuse_overload(self, load: Payload, loaded: Arm) -> None:
+        """Refuse what the motors do not hold where the arm is, unless it is less than they are said to hold already."""
+        q, still = self.record["state"]["q_good"] if self._is_reset else self.arm.home, np.zeros(self.arm.n)
+        need, before = (np.abs(arm.dynamics(q, still)["g"]) / self.arm.tau_max for arm in (loaded, self._loaded))
+        over = (need > 1.0) & (need > before)
+        if over.any():
+            i = int(np.argmax(need * over))
+            raise InvalidInputError(
+                f"mass = {load.mass:g} kg, {1000 * np.linalg.norm(load.com):.0f} mm from the tool point, asks "
+                f"{need[i] * self.arm.tau_max[i]:.4g} N m of joint '{self.arm.model.joint(i).name}' here, which has "
+                f"{self.arm.tau_max[i]:g}; give what the arm can carry"
+            )
 
     def _shows(self, load: Payload, gravity: np.ndarray) -> bool:
         measured = self.record["measurement"]
@@ -257,7 +263,7 @@ class Controller(Independent):
             return None
         mass = max(known.mass + float(state["load"][0]), 0.0)
         if mass < _LEAST_KG:
-            return NOTHING
+            return checked_payload(0.0)
         return Payload(mass, (known.mass * known.com + state["load"][1:]) / mass, np.zeros((3, 3)))
 
     def _in_range(self, q: np.ndarray) -> np.ndarray:
@@ -300,19 +306,22 @@ class Controller(Independent):
     def step(self, measurement: Measurement, target: Target | None = None) -> Output:
         """Run one tick of 1 ms.
 
-        A target whose object and numbers are those of the last call is not checked again. None says that no new one
-        came: the last one holds, for `target_timeout_s` at most.
+        A target of the same numbers as the last is not checked again. None says that no new one came: the last one
+        holds, for `target_timeout_s` at most. What is raised here leaves the tick undone: whoever drives an arm then
+        calls `step(measurement)` at once, which gives the torque under the last good target.
 
         Raises:
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
             UnreachableError: no posture was given and none was found for the pose.
         """
+        if not isinstance(measurement, Measurement):
+            raise InvalidInputError(f"measurement is {type(measurement).__name__}; give a contactsafe.Measurement")
         if not self._is_reset:
             raise InvalidInputError(
                 "the controller was not reset; call reset(q) with the measured joint positions first"
             )
         self._kept[...] = target is None
-        if target is not None and (target is not self._last_target or _numbers(target) != self._last_numbers):
+        if target is not None:
             self.set_target(target)
         self._set_measurement(measurement)
         tick_at(self._ticked, self._index)
@@ -320,7 +329,14 @@ class Controller(Independent):
 
     def set_target(self, target: Target) -> None:
         """Check a target and make it the one in force; on error the last one stays."""
-        record, numbers = self.record["target"], _numbers(target)  # before they are checked: others may change them
+        if not isinstance(target, Target):
+            raise InvalidInputError(f"target is {type(target).__name__}; give a contactsafe.Target")
+        if not isinstance(target.pose, Pose):
+            raise InvalidInputError(f"target.pose is {type(target.pose).__name__}; give a contactsafe.Pose")
+        numbers = _numbers(target)  # before they are checked: others may change them
+        if numbers == self._last_numbers:
+            return
+        record = self.record["target"]
         position = finite_array(target.pose.position, (3,), "pose.position")
         quat = unit_quaternion(target.pose.quat, "pose.quat")
         stiffness = self._gain(target.stiffness, "stiffness", "1/s²", self.config.stiffness_range)
@@ -332,7 +348,7 @@ class Controller(Independent):
             posture = self.arm.joint_vector(target.posture, "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
-        self._last_target, self._last_numbers = target, numbers
+        self._last_numbers = numbers
 
     def _gain(self, value, name: str, unit: str, allowed: tuple[float, float]) -> np.ndarray:
         gain = finite_array(value, (6,), name)
@@ -387,6 +403,21 @@ def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
     }
 
 
+def _slot(arm: Arm, records: np.ndarray | None, index: int) -> tuple[np.ndarray, int]:
+    """Check where a controller is to live: an array of records, and the place in it."""
+    if records is None:
+        records = np.zeros(1, dtype=controller_dtype(arm.n))
+    fits = isinstance(records, np.ndarray) and records.ndim == 1 and records.dtype == controller_dtype(arm.n)
+    if not fits or not records.flags.writeable:
+        raise InvalidInputError(
+            f"records are no writable array of controllers for {arm.n} joints; "
+            f"give numpy.zeros(how_many, dtype=controller_dtype({arm.n}))"
+        )
+    if not isinstance(index, int | np.integer) or not 0 <= index < len(records):
+        raise InvalidInputError(f"index = {index!r} is no place in {len(records)} records; count from 0")
+    return records, int(index)
+
+
 def _numbers(target: Target) -> list:
     """Take down a target's numbers in whatever form is quickly compared: they may be changed in place."""
     pose = target.pose
@@ -402,7 +433,7 @@ def _taken_down(value):
 
 def _shaped(value, n: int, name: str) -> np.ndarray:
     """Check a measurement's shape only: numbers that are not finite are the tick's to refuse, the arm must not drop."""
-    array = np.asarray(value, dtype=float)
+    array = value if type(value) is np.ndarray and value.dtype == float else real_array(value, name, (n,))
     if array.shape != (n,):
         raise InvalidInputError(f"{name} has shape {array.shape}; give {n} numbers")
     return array
@@ -411,7 +442,7 @@ def _shaped(value, n: int, name: str) -> np.ndarray:
 def _seconds(value) -> float:
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidInputError(f"time is {type(value).__name__}, not a number; give seconds") from None
 
 

@@ -28,7 +28,10 @@ _SLOW_RAD_S = 1.0
 """Joints that are faster tell of inertia and friction, not of weight."""
 
 _SETTLE_S = 0.2
+"""Until then the observer shows what was before."""
+
 _SMOOTH_S = 0.3
+"""Time over which it is judged whether a load explains the torques: each joint is read many times in it."""
 
 _LEFT = 0.25
 """A load explains the torques but for this share of their squares."""
@@ -54,17 +57,18 @@ def take_off_payload(c):
     differences between two measurements, as the observer's is: what one of them errs, the other does.
     """
     state, load = c.state, c.payload
-    if load.in_wrench == 0 or state.has_wrench == 0 or state.bridged > 0:
+    if load.in_wrench == 0 or state.bridged > 0:
         return
     momentum, weight, turning = stack_vector(6), stack_vector(6), stack_vector(3)
     payload_weight_into(load, c.dynamics.rotation, c.handle.gravity, weight)
     payload_momentum_into(load, c.dynamics, momentum)
-    cross_into(c.dynamics.velocity[:3], momentum[:3], turning)
-    seconds = max(state.since, 1.0) * c.params.dt
-    for k in range(6):
-        rate = (momentum[k] - state.payload_momentum[k]) / seconds if state.started != 0 else 0.0
-        state.wrench_ee[k] += rate - weight[k]
-    state.wrench_ee[3:] += turning
+    if state.has_wrench != 0:
+        cross_into(c.dynamics.velocity[:3], momentum[:3], turning)
+        seconds = max(state.since, 1.0) * c.params.dt
+        for k in range(6):
+            rate = (momentum[k] - state.payload_momentum[k]) / seconds if state.started != 0 else 0.0
+            state.wrench_ee[k] += rate - weight[k]
+        state.wrench_ee[3:] += turning
     state.payload_momentum[:] = momentum
 
 
@@ -197,11 +201,12 @@ def take_up(controllers, index, weight):
     state, dynamics, n = c.state, c.dynamics, c.state.tau.shape[0]
     change, new_weight = stack_vector(n), stack_vector(6)
     change[:] = dynamics.g
-    update_dynamics(c.handle, state.q, state.qd, dynamics)
+    update_dynamics(c.handle, state.q_good, state.qd_good, dynamics)
     for i in range(n):
         change[i] = dynamics.g[i] - change[i]
         state.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
-    matvec_into(dynamics.M, state.qd, state.momentum)
+        state.impulse[i] -= state.impulse_ticks * change[i]
+    matvec_into(dynamics.M, state.qd_good, state.momentum)
     payload_momentum_into(c.payload, dynamics, state.payload_momentum)
     share = _there(state.residual, change)
     _move(state.residual, share, change)

@@ -148,16 +148,28 @@ class Arm(Independent):
         return out[0]
 
 
+def real_array(value, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Make a float array of whatever holds real numbers.
+
+    Raises:
+        InvalidInputError: it holds something else; `shape` is what is asked for.
+    """
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind != "c":
+            return np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}")
+
+
 def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
     """Check an array at the door: its shape, and that every number is finite.
 
     Raises:
         InvalidInputError: naming what was found and what is allowed.
     """
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}") from None
+    array = real_array(value, name, shape)
     if array.shape != shape:
         raise InvalidInputError(f"{name} has shape {array.shape}; give {_words(shape)}")
     if not np.isfinite(array).all():

@@ -27,7 +27,8 @@ class Payload(NamedTuple):
     inertia: np.ndarray
 
 
-NOTHING = Payload(0.0, np.zeros(3), np.zeros((3, 3)))
+_REACH_M = 1.0
+"""Nothing that a tool holds is further from its point: what is said to be is a slip of units."""
 
 
 def checked_payload(mass, com=None, inertia=None) -> Payload:
@@ -45,6 +46,9 @@ def checked_payload(mass, com=None, inertia=None) -> Payload:
     if kg < 0.0:
         raise InvalidInputError(f"mass = {kg:g} kg; give kg ≥ 0, 0 where the tool carries nothing")
     centre = finite_array(np.zeros(3) if com is None else com, (3,), "com")
+    reach = float(np.linalg.norm(centre))
+    if reach > _REACH_M:
+        raise InvalidInputError(f"com is {reach:.4g} m from the tool point, over {_REACH_M:g}; give m, tool's frame")
     tensor = finite_array(np.zeros((3, 3)) if inertia is None else inertia, (3, 3), "inertia")
     slack = 1e-9 + 1e-6 * float(abs(tensor).max())
     if abs(tensor - tensor.T).max() > slack:
@@ -57,6 +61,11 @@ def checked_payload(mass, com=None, inertia=None) -> Payload:
         )
     if kg == 0.0 and high > slack:
         raise InvalidInputError("mass is 0 kg but inertia is not; give the mass, or no inertia")
+    if high > kg * _REACH_M**2 + slack:
+        raise InvalidInputError(
+            f"inertia reaches {high:.4g} kg m², more than {kg:g} kg have within {_REACH_M:g} m; give kg m² about the "
+            "centre of mass"
+        )
     return Payload(kg, centre, tensor)
 
 
