@@ -283,6 +283,19 @@ def test_first_measurement_bad_let_the_first_good_tick_jump_by_2_nm(panda):
     assert np.abs(np.diff(torques, axis=0)).max() <= 1.0
 
 
+@pytest.mark.parametrize("hz", [10, 25, 100])
+def test_a_joint_that_shakes_was_a_change_of_pace(panda, hz):
+    """What a velocity does between two ticks is not known: up to 30 good measurements in a row were not believed."""
+    controller, rng = controller_at(panda, CONFIG), np.random.default_rng(0)
+    q, qd, target = panda.home.copy(), np.zeros(7), hold(panda, panda.home)
+    for k in range(400):
+        qd[0], qd[6] = 0.1 * np.sin(0.01 * k), 4.0 * np.sin(0.002 * np.pi * hz * k) * (1.0 + 0.3 * rng.normal())
+        q = q + 0.001 * qd
+        out = controller.step(Measurement(q, qd, UNTOUCHED), target)
+        assert out.bridged == 0
+    assert out.fault == "none"
+
+
 def test_simulator_at_exact_rest_is_not_frozen(panda):
     controller = controller_at(panda, CONFIG)
     for _ in range(100):

@@ -11,17 +11,35 @@ from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
 from contactsafe.control.damping import joint_damping_limits
-from contactsafe.control.limits import coming_speed, joint_excess, joint_stop_gains, joint_stop_torque, limit_torque
+from contactsafe.control.limits import (
+    coming_speed,
+    joint_excess,
+    joint_stop_gains,
+    joint_stop_torque,
+    limit_torque,
+)
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
 torques = arrays(float, 3, elements=st.floats(-1e6, 1e6))
 
 
-@given(torques, arrays(float, 3, elements=st.floats(-1.0, 1.0)))
-def test_torque_and_its_rate_stay_within_limits(tau, share):
+def limited(tau, previous, M_inv):
+    """Keep a command within the limits, 1 N m a tick among them, in place; tell whether that took anything."""
+    return limit_torque(tau, previous, TAU_MAX, 1.0, M_inv)
+
+
+def light_chain(seed):
+    """Draw the inverse inertia of three joints, coupled, the lightest down to 1e-6 kg m²."""
+    rng = np.random.default_rng(seed)
+    root = np.diag(10.0 ** rng.uniform(-3.0, 0.5, 3)) @ rng.normal(size=(3, 3))
+    return np.linalg.inv(root @ root.T + 1e-6 * np.eye(3))
+
+
+@given(torques, arrays(float, 3, elements=st.floats(-1.0, 1.0)), st.integers(0, 2**32 - 1))
+def test_torque_and_its_rate_stay_within_limits(tau, share, seed):
     previous = share * TAU_MAX
     asked = tau.copy()
-    clipped = limit_torque(tau, previous, TAU_MAX, 1.0)
+    clipped = limited(tau, previous, light_chain(seed))
     assert (np.abs(tau) <= TAU_MAX).all()
     assert (np.abs(tau - previous) <= 1.0 + 1e-12).all()
     assert clipped == (tau != asked).any()
@@ -29,14 +47,33 @@ def test_torque_and_its_rate_stay_within_limits(tau, share):
 
 def test_what_is_within_limits_passes_unchanged():
     tau = np.array([10.5, -86.0, 11.9])
-    assert not limit_torque(tau, np.array([10.0, -86.5, 12.0]), TAU_MAX, 1.0)
+    assert not limited(tau, np.array([10.0, -86.5, 12.0]), light_chain(0))
     assert_array_equal(tau, [10.5, -86.0, 11.9])
 
 
 def test_limit_is_reached_exactly():
     tau = np.array([20.0, -90.0, 50.0])
-    assert limit_torque(tau, np.array([10.0, -86.5, 11.5]), TAU_MAX, 1.0)
+    assert limited(tau, np.array([10.0, -86.5, 11.5]), np.eye(3))
     assert_array_equal(tau, [11.0, -87.0, 12.0])
+
+
+@given(arrays(float, 3, elements=st.floats(-100.0, 100.0)), st.integers(0, 2**32 - 1))
+def test_limits_never_take_more_of_the_motion_than_clipping_does(tau, seed):
+    """By Gauss's measure of what a constraint costs."""
+    M_inv, asked = light_chain(seed), tau.copy()
+    clip = np.clip(asked, -1.0, 1.0) - asked
+    limited(tau, np.zeros(3), M_inv)
+    assert (tau - asked) @ M_inv @ (tau - asked) <= clip @ M_inv @ clip * (1.0 + 1e-9) + 1e-9
+
+
+def test_a_torque_limit_on_a_heavy_joint_flung_a_light_one():
+    """A shoulder that gets 30 N m less than asked leaves the wrist's acceleration as asked, not 10000 rad/s² more."""
+    M_inv = np.linalg.inv([[2.0, 0.0, 0.0], [0.0, 0.5, 1e-3], [0.0, 1e-3, 5e-6]])
+    asked = np.array([0.0, 31.0, 0.0])
+    clip, tau = np.clip(asked, -1.0, 1.0), asked.copy()
+    limited(tau, np.zeros(3), M_inv)
+    assert abs(M_inv[2] @ (clip - asked)) > 10_000.0
+    assert abs(M_inv[2] @ (tau - asked)) < 51.0
 
 
 Q_MIN, Q_MAX, QD_MAX = np.array([-2.0, -3.0]), np.array([2.0, -0.1]), np.array([2.0, 1.5])
@@ -60,8 +97,8 @@ def gains(excess, intrusion, inertia=M, damping=NONE, rate=PLENTY, stiffness=STI
 def stop(tau, q, qd, in_force=(0.0, 0.0), inertia=M):
     """Give what a command becomes at the joint stops, with another one in force."""
     out, qd, M_inv = np.array(tau, dtype=float), np.array(qd, dtype=float), np.linalg.inv(inertia)
-    speed, ahead = coming_speed(qd, M_inv, np.array(in_force), 1.0, 0.001)
-    excess, intrusion = np.empty(2), np.empty(2)
+    speed, ahead, excess, intrusion = np.empty((4, 2))
+    coming_speed(qd, M_inv, np.array(in_force), 1.0, 0.001, speed, ahead)
     some = joint_excess(np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, excess, intrusion)
     assert some == (excess.any() or intrusion.any())
     joint_stop_torque(out, M_inv, qd, excess, intrusion, MARGIN, *gains(excess, intrusion, inertia))

@@ -168,6 +168,16 @@ def test_limits_come_from_motors_gears_and_joints():
     assert_allclose(asked, [10.0, 150.0, 150.0, 20.0, 28.0, 5.0], rtol=1e-12)
 
 
+def test_strong_motors_were_as_slow_as_a_pandas():
+    """Unless it is given, the torque rate takes the strongest motor to its limit as fast as a Panda's does."""
+    six = mujoco.MjModel.from_xml_string(SIX)
+    rates = [
+        robots.from_mjcf(six, site="tip", tau_max=np.full(6, tau_max), **given).torque_rate_max
+        for tau_max, given in ((20.0, {}), (87.0, {}), (130.5, {}), (130.5, {"torque_rate_max": 500.0}))
+    ]
+    assert_allclose(rates, [1000.0, 1000.0, 1500.0, 500.0])
+
+
 def test_home_is_the_key_frame_or_the_middle_of_the_range():
     keyed = robots.from_mjcf(cell(), site="left/tcp")
     assert_array_equal(keyed.home, robots.panda().home)

@@ -234,17 +234,19 @@ def _accept(c, since):
 def _learn_pace(c):
     """Learn how many ticks of time a call comes to where no clock says it, from how far the joints go: Kalman's filter.
 
-    A moving arm tells it precisely, one at rest not at all. A single late tick is none of it, many are.
+    A moving arm tells it precisely, one at rest not at all, and one whose velocity changes as much as it moves little:
+    what lies between two velocities is not known. A single late tick is none of it, many are.
     """
     state, m, dt = c.state, c.measurement, c.params.dt
-    way, squares = 0.0, 0.0
+    way, squares, unknown = 0.0, 0.0, _PACE_RAD2
     for i in range(m.q.shape[0]):
-        mean = 0.5 * dt * (state.qd_good[i] + m.qd[i])
+        mean, change = 0.5 * dt * (state.qd_good[i] + m.qd[i]), 0.5 * dt * (m.qd[i] - state.qd_good[i])
         way += (m.q[i] - state.q_good[i]) * mean
         squares += mean * mean
+        unknown += change * change
     if squares < _STANDS_RAD2:
         return
-    variance, news = _PACE_RAD2 / squares, way / squares - state.pace
+    variance, news = unknown / squares, way / squares - state.pace
     if news * news > 9.0 * (state.pace_variance + variance):
         state.pace_variance = min(state.pace_variance + 0.02, _PACE_UNKNOWN)
         return

@@ -379,8 +379,8 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["q_min"], params["q_max"] = arm.q_min - narrower, arm.q_max + narrower
     params["runaway_speed"] = np.where(np.isfinite(arm.qd_max), arm.qd_max, UNKNOWN_SPEED_LIMIT)
     params["qd_max"] = config.joint_speed_fraction * params["runaway_speed"]
-    # From full drive to full braking, and the lag of what is measured.
-    params["reversal_s"] = 2.0 * arm.tau_max / arm.torque_rate_max + 10.0 * config.loop_delay_s
+    # From full drive to full braking of all that may drive a joint, and the lag of what is measured.
+    params["reversal_s"] = 2.0 * arm.tau_max.max() / arm.torque_rate_max + 10.0 * config.loop_delay_s
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
     params["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - _OUTSIDE_RAD
     params["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + _OUTSIDE_RAD

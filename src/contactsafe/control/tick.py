@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
+from contactsafe.control.braking import brake_into, braking_share
 from contactsafe.control.clock import (
     BRIDGE_TICKS,
     all_usable,
@@ -78,7 +79,8 @@ def control_tick(c):
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
     Order: measurement and time, nominal dynamics, observer, supervisor, weighing, law, push bound, joint stops, energy,
-    friction, limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
+    speed, friction, limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says
+    why.
     """
     state, usable = c.state, is_usable(c)
     if not usable:
@@ -111,9 +113,7 @@ def control_tick(c):
         state.since = 0.0
     set_step(c, state.elapsed)
     tau = _law(c, Lambda, J_bar)
-    if state.fault == _RUNAWAY:
-        tau = _brake(c)
-    elif state.braking != 0:
+    if state.braking != 0:
         tau = stop_torque(c) + c.dynamics.c + c.dynamics.g
     _finish(c, tau)
 
@@ -138,7 +138,7 @@ def _wait(c):
     if state.bridged > BRIDGE_TICKS:
         state.fault, state.braking = MISSING, 1
         tau = c.dynamics.g.copy()
-        limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step)
+        limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step, c.dynamics.M_inv)
         state.tau[:] = tau
     c.output.torque[:] = state.tau
     c.output.fault, c.output.bridged = state.fault, state.bridged
@@ -189,16 +189,6 @@ def _watch_speed(c):
         state.overspeed_s[i] += state.step.dt
         if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
             state.fault = _RUNAWAY
-
-
-@compiled
-def _brake(c):
-    """Damp all joints as much as they take, and carry the arm's weight: what is left to do when the arm runs away."""
-    state, dynamics = c.state, c.dynamics
-    state.task_damping = 0.0
-    joint_damping_limits(dynamics.M_inv, c.params.damping_rate, state.damping_limit)
-    state.joint_damping[:] = state.damping_limit
-    return dynamics.c + dynamics.g - state.damping_limit * state.qd
 
 
 @compiled
@@ -357,14 +347,12 @@ def _refuse_unusable(state, tau):
 
 
 @compiled
-def _stop_joints(c, tau_net):
+def _stop_joints(c, tau_net, speed, ahead):
     """Keep joints in their range and below their speed limits, in place; tell whether that took anything."""
     state, dynamics, params = c.state, c.dynamics, c.params
     q, qd = state.q, state.qd
     n = q.shape[0]
     excess, intrusion = stack_vector(n), stack_vector(n)
-    dt = max(state.step.dt, params.dt)
-    speed, ahead = coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt)
     if not joint_excess(
         q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
         excess, intrusion,
@@ -381,6 +369,25 @@ def _stop_joints(c, tau_net):
 
 
 @compiled
+def _slow_down(c, tau, speed):
+    """Brake the whole arm in place of the command as far as it is too fast; tell whether that took anything.
+
+    Where it has run away nothing but that is left to do.
+    """
+    state, dynamics, params = c.state, c.dynamics, c.params
+    share = 1.0
+    if state.fault != _RUNAWAY:
+        share = braking_share(state.qd, speed, dynamics.c, params.runaway_speed, params.tau_max)
+    if share == 0.0:
+        return False
+    brake, torque_rate = stack_vector(tau.shape[0]), params.torque_step / params.dt
+    brake_into(dynamics.M, dynamics.M_inv, state.qd, params.tau_max, torque_rate, params.damping_rate, brake)
+    for i in range(tau.shape[0]):
+        tau[i] += share * (brake[i] + dynamics.c[i] - tau[i])
+    return True
+
+
+@compiled
 def _finish(c, tau):
     """Add friction compensation and joint stops, apply the limits, remember and report."""
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
@@ -390,19 +397,23 @@ def _finish(c, tau):
     if state.loaded != 0 and state.task_share < _WHOLE:
         limited_by |= LIMITED_BY_LOAD
     # Joints are stopped from what the motors can do, not from what is wanted of them.
-    clipped = limit_torque(tau, tau, params.tau_max, step.torque_step)
+    clipped = limit_torque(tau, state.tau, params.tau_max, math.inf, dynamics.M_inv)
     tau -= dynamics.g + dynamics.c
-    if _stop_joints(c, tau):
+    dt, speed, ahead = max(step.dt, params.dt), stack_vector(tau.shape[0]), stack_vector(tau.shape[0])
+    coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt, speed, ahead)
+    if _stop_joints(c, tau, speed, ahead):
         limited_by |= LIMITED_BY_RANGE
     tau += dynamics.c
     if power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s):
         limited_by |= LIMITED_BY_ENERGY
+    if _slow_down(c, tau, speed):
+        limited_by |= LIMITED_BY_RANGE
     tau += dynamics.g
     state.friction[:] = 0.0
     if params.friction_compensation != 0:
         tau += joint_friction_into(params.friction, qd, state.friction)
     _refuse_unusable(state, tau)
-    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step) or clipped
+    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step, dynamics.M_inv) or clipped
     out.limited_by = limited_by | LIMITED_BY_RATE if clipped else limited_by
     state.tau[:] = tau
     given = dot(tau - state.friction - dynamics.g, qd)

@@ -29,6 +29,9 @@ _NOTHING = 1e-12
 _LEVER_DOUBTED = 0.02
 """Of `Arm.lever_doubted`, m. Many arms are bent in one plane, where a push from the side fits points everywhere."""
 
+_USUAL_RATE, _USUAL_TORQUE = 1000.0, 87.0
+"""Of a Panda, N m/s and N m: a motor of unknown torque rate reaches its limit in the same time."""
+
 
 def from_mjcf(
     scene: str | os.PathLike | mujoco.MjModel,
@@ -36,7 +39,7 @@ def from_mjcf(
     joints: Sequence[str] | None = None,
     *,
     tau_max=None,
-    torque_rate_max: float = 1000.0,
+    torque_rate_max: float | None = None,
     friction=None,
     home=None,
 ) -> Arm:
@@ -56,7 +59,8 @@ def from_mjcf(
             hinge with an actuator.
         tau_max: torque limits, (n,), N m; None for the model's own: forcerange and, of motors, ctrlrange, times gear,
             and actuatorfrcrange of joints. Where both are given, the smaller holds.
-        torque_rate_max: N m/s, every joint.
+        torque_rate_max: N m/s, every joint; None for what takes the strongest motor to its limit in 87 ms, as on a
+            Panda, and no less than the Panda's 1000 N m/s.
         friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3); None for none.
         home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
 
@@ -79,7 +83,9 @@ def from_mjcf(
     q_min, q_max = np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
     limits = _torque_limits(model, chain, tau_max)
     data, key_home = _at_start(model, chain)
-    if not finite_array(torque_rate_max, (), "torque_rate_max") > 0.0:
+    if torque_rate_max is None:
+        torque_rate_max = _USUAL_RATE * max(1.0, float(limits.max()) / _USUAL_TORQUE)
+    elif not finite_array(torque_rate_max, (), "torque_rate_max") > 0.0:
         raise InvalidInputError(f"torque_rate_max = {torque_rate_max} must be greater than 0; give N m/s")
     return Arm(
         name=model.names.split(b"\0")[0].decode(),
