@@ -133,9 +133,7 @@ def weigh_load(c):
     A fault says where a load keeps the tool from its target.
     """
     state, params = c.state, c.params
-    n = state.tau.shape[0]
     i = state.turn
-    state.turn = (i + 1) % n
     state.slow_s = state.slow_s + state.step.dt if _is_slow(state.qd) else 0.0
     if state.slow_s < _SETTLE_S:
         state.loaded, state.sags_s = 0, 0.0

@@ -34,11 +34,9 @@ _TURNS_RAD = 1e4
 _FASTER = 5.0
 """Multiple of a joint's speed limit at which its measured speed is not believed."""
 
-LOAD = 10
-"""Fault of a load that keeps the tool from its target."""
-
-MISSING, REPEATED, OVERDUE, UNTRUE = 5, 7, 8, 9
-"""Faults of measurements that last: no usable numbers, the same again, too late, in contradiction to those before."""
+BAD_MEASUREMENT, BAD_TARGET, BAD_QUATERNION, BAD_GAIN, MISSING, NO_TORQUE = 1, 2, 3, 4, 5, 6
+REPEATED, OVERDUE, UNTRUE, LOAD, RUNAWAY = 7, 8, 9, 10, 11
+"""Faults, see `FAULTS`."""
 
 LIMITED_BY_CONTACT, LIMITED_BY_TOOL_FORCE, LIMITED_BY_ENERGY, LIMITED_BY_RATE, LIMITED_BY_RANGE = 1, 2, 4, 8, 16
 LIMITED_BY_LOAD = 32
@@ -56,19 +54,20 @@ energy tank, torque and its rate, joint range and speed; and whether it was a lo
 
 FAULTS = {
     0: "none",
-    1: "a measurement is not finite or beyond what the arm can do; it was bridged by a prediction",
-    2: "target is not finite or absurdly large; the last good target holds",
-    3: "target quaternion is not of unit length; the last good target holds",
-    4: "target stiffness or damping is out of range; the last good target holds",
-    5: "measurements stayed unusable for over 20 ticks; the arm was braked until reset",
-    6: "the law gave no finite torque; the last torque was repeated",
-    7: "the measurement did not change for over 20 ticks of motion; the arm was braked until reset",
-    8: "over 20 ticks passed between two measurements; the arm was braked until reset",
-    9: "measurements contradicted each other, or went on elsewhere, for over 20 ticks; the arm was braked until reset",
-    10: "a load that the controller was not told of keeps the tool below its target; see payload_estimate()",
-    11: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
+    BAD_MEASUREMENT: "a measurement is not finite or beyond what the arm can do; it was bridged by a prediction",
+    BAD_TARGET: "target is not finite or absurdly large; the last good target holds",
+    BAD_QUATERNION: "target quaternion is not of unit length; the last good target holds",
+    BAD_GAIN: "target stiffness or damping is out of range; the last good target holds",
+    MISSING: "measurements stayed unusable for over 20 ticks; the arm was braked until reset",
+    NO_TORQUE: "the law gave no finite torque; the last torque was repeated",
+    REPEATED: "the measurement did not change for over 20 ticks of motion; the arm was braked until reset",
+    OVERDUE: "over 20 ticks passed between two measurements; the arm was braked until reset",
+    UNTRUE: "measurements contradict each other, or go on elsewhere, for over 20 ticks; the arm was braked until reset",
+    LOAD: "a load that the controller was not told of keeps the tool below its target; see payload_estimate()",
+    RUNAWAY: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
 }
-"""What `fault` in the state and output means; the first one is latched until reset, but 5 and 7 … 9 replace it."""
+"""What `fault` in the state and output means. The first is latched until reset, but what brakes the arm replaces it:
+MISSING, REPEATED, OVERDUE, UNTRUE and RUNAWAY; and LOAD goes once the load is told."""
 
 
 def measurement_dtype(n: int) -> np.dtype:
@@ -281,6 +280,7 @@ def _commanded(n: int) -> list[tuple]:
         ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
         ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
         ("damping_share", _f, (n,)),  # of each joint's damping in force
+        ("runaway", _i),  # 1 once a joint stayed beyond its speed limit though it was braked, until reset
         ("overspeed_s", _f, (n,)),  # time beyond the speed limit, s
         ("posture_share", _f),  # of K_pose in force
         ("share_reason", _i),  # key of LIMITS that took what is missing of it

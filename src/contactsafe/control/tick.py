@@ -52,6 +52,10 @@ from contactsafe.control.limits import (
 )
 from contactsafe.control.load import expect_load, take_off_payload, weigh_load
 from contactsafe.control.records import (
+    BAD_GAIN,
+    BAD_MEASUREMENT,
+    BAD_QUATERNION,
+    BAD_TARGET,
     FREE,
     LIMITED_BY_CONTACT,
     LIMITED_BY_ENERGY,
@@ -60,15 +64,14 @@ from contactsafe.control.records import (
     LIMITED_BY_RATE,
     LIMITED_BY_TOOL_FORCE,
     MISSING,
+    NO_TORQUE,
+    RUNAWAY,
 )
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
 from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
 from contactsafe.robot.stack import stack_vector
-
-_BAD_MEASUREMENT, _BAD_TARGET, _BAD_QUATERNION, _BAD_GAIN, _NO_TORQUE = 1, 2, 3, 4, 6
-_RUNAWAY = 11
 
 _WHOLE = 0.99
 """A share of the task this large leaves nothing out that anyone would notice."""
@@ -84,7 +87,7 @@ def control_tick(c):
     """
     state, usable = c.state, is_usable(c)
     if not usable:
-        _latch(state, _BAD_MEASUREMENT)
+        _latch(state, BAD_MEASUREMENT)
         if state.started == 0:
             _wait(c)
             return
@@ -109,6 +112,7 @@ def control_tick(c):
         supervise(c)
         weigh_links(c)
         weigh_load(c)
+        state.turn = (state.turn + 1) % state.tau.shape[0]
         _watch_speed(c)
         state.since = 0.0
     set_step(c, state.elapsed)
@@ -148,13 +152,13 @@ def _wait(c):
 def _target_fault(target, params):
     usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_pose)
     if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
-        return _BAD_TARGET
+        return BAD_TARGET
     if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
-        return _BAD_QUATERNION
+        return BAD_QUATERNION
     for i in range(6):
         K, D = target.K_task[i], target.D_task[i]
         if K < params.stiffness_min or K > params.stiffness_max or D < params.damping_min or D > params.damping_max:
-            return _BAD_GAIN
+            return BAD_GAIN
     return 0
 
 
@@ -188,7 +192,7 @@ def _watch_speed(c):
             continue
         state.overspeed_s[i] += state.step.dt
         if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
-            state.fault = _RUNAWAY
+            state.fault, state.runaway = RUNAWAY, 1
 
 
 @compiled
@@ -342,7 +346,7 @@ def _push_limit(c):
 def _refuse_unusable(state, tau):
     """Repeat the last command where a law gave none that is finite."""
     if not all_usable(tau):
-        _latch(state, _NO_TORQUE)
+        _latch(state, NO_TORQUE)
         tau[:] = state.tau
 
 
@@ -376,7 +380,7 @@ def _slow_down(c, tau, speed):
     """
     state, dynamics, params = c.state, c.dynamics, c.params
     share = 1.0
-    if state.fault != _RUNAWAY:
+    if state.runaway == 0:
         share = braking_share(state.qd, speed, dynamics.c, params.runaway_speed, params.tau_max)
     if share == 0.0:
         return False
