@@ -145,6 +145,20 @@ def _add_operators(folder, rng):
     _reseal(folder)
 
 
+def _drop_ends(folder, rng):
+    """Take all outputs or inputs from an operator, most often from one put in between."""
+    model = graph._messages()["Model"]()
+    model.ParseFromString((folder / POLICY).read_bytes())
+    node = rng.choice(model.graph.node)
+    if rng.random() < 0.7:
+        node = model.graph.node.add(op_type=rng.choice(tuple(RULES)), input=[model.graph.input[0].name], output=["end"])
+        node.attribute.add(name="axis", type=2).i = 1
+    for ends in rng.choice(((node.output,), (node.output,), (node.input,), (node.output, node.input))):
+        del ends[:]
+    (folder / POLICY).write_bytes(model.SerializePartialToString())
+    _reseal(folder)
+
+
 def _add_unknown_fields(folder, rng):
     """Append what a reader of protobuf may merge, skip or take for something else."""
     data = (folder / POLICY).read_bytes()
@@ -158,7 +172,7 @@ def _add_unknown_fields(folder, rng):
 
 BUNDLE_WAYS = (
     _flip_bits, _flip_bits, _cut_or_grow, _change_manifest, _change_manifest, _break_json, _replace_file, _change_graph,
-    _change_graph, _change_graph, _add_operators, _add_operators, _add_unknown_fields,
+    _change_graph, _change_graph, _add_operators, _add_operators, _drop_ends, _add_unknown_fields,
 )  # fmt: skip
 
 

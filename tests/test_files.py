@@ -32,6 +32,13 @@ def test_a_file_is_written_with_the_users_permissions(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+def test_files_that_threads_write_meanwhile_do_not_become_writable_for_all(tmp_path, monkeypatch):
+    """The umask of the process was 0 for a moment, to be read."""
+    monkeypatch.setattr(os, "umask", lambda mask: pytest.fail(f"the umask was set to {mask}"))
+    write_whole(tmp_path / "file", b"new")
+    assert (tmp_path / "file").read_bytes() == b"new"
+
+
 def test_a_file_size_limit_leaves_the_old_file_whole(tmp_path):
     """RLIMIT_FSIZE fails as a full disk does, but anybody can set it."""
     write_whole(tmp_path / "file", b"old")
@@ -97,6 +104,39 @@ def test_a_holder_that_was_killed_holds_nothing(tmp_path, holder):
         assert json.loads((tmp_path / LOCK).read_text())["process"] == os.getpid()
 
 
+KILLED_WRITING = """
+import os, pathlib, signal, sys
+from contactsafe.files import held, write_whole
+os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+with held(pathlib.Path(sys.argv[1])):
+    write_whole(pathlib.Path(sys.argv[1]) / "checkpoint.pt", bytes(1000))
+"""
+
+
+def test_what_a_killed_training_was_writing_is_gone_when_the_folder_is_held_again(tmp_path):
+    """Each kill left a checkpoint under a hidden name, for ever; what is not ours stays."""
+    others = [".checkpoint.pt-mine.part", "checkpoint.pt-0123456789abcdef.part", ".notes-20261125", ".part"]
+    for name in others:
+        (tmp_path / name).write_text("years of work")
+    (tmp_path / ".folder-0123456789abcdef.part").mkdir()
+    (tmp_path / ".link-0123456789abcdef.part").symlink_to(others[0])
+    others += [".folder-0123456789abcdef.part", ".link-0123456789abcdef.part", LOCK]
+    ended = subprocess.run([sys.executable, "-c", KILLED_WRITING, str(tmp_path)], timeout=60, check=False)
+    assert ended.returncode == -signal.SIGKILL
+    (left,) = {path.name for path in tmp_path.iterdir()} - set(others)
+    assert left.startswith(".checkpoint.pt-")
+    with held(tmp_path):
+        assert {path.name for path in tmp_path.iterdir()} == set(others)
+
+
+def test_what_the_holder_is_writing_is_not_taken_away_by_one_that_is_refused(tmp_path, holder):
+    part = tmp_path / ".checkpoint.pt-0123456789abcdef.part"
+    part.write_text("half")
+    with pytest.raises(OutputError), held(tmp_path):
+        pass
+    assert part.read_text() == "half"
+
+
 def test_the_same_process_is_refused_as_well_and_may_hold_again_later(tmp_path):
     with held(tmp_path), pytest.raises(OutputError, match=f"in use by process {os.getpid()} on "), held(tmp_path):
         pass
@@ -123,8 +163,13 @@ def test_children_of_a_killed_holder_do_not_hold_for_it(tmp_path):
         process.stdout.close()
 
 
-def test_a_lock_that_says_nonsense_is_told_without_a_traceback(tmp_path, holder):
-    (tmp_path / LOCK).write_text("[" * 500)
+NONSENSE = ("", "[" * 500, "[" * 1000, '{"process": ' * 83, '{"process": 1e999}', "\xff", '{"process": 1, "host": []}',
+    '{"process": 1, "host": "a\\nb", "since": "now"}', '{"process": 1, "host": 1, "since": "\\u001b[2J"}')  # fmt: skip
+
+
+@pytest.mark.parametrize("text", NONSENSE)
+def test_a_lock_that_says_nonsense_is_told_without_a_traceback(tmp_path, holder, text):
+    (tmp_path / LOCK).write_text(text, encoding="latin-1")
     with pytest.raises(OutputError, match=r"is in use by another process; wait"), held(tmp_path):
         pass
 

@@ -18,6 +18,7 @@ import stat
 import sys
 import tempfile
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -83,7 +84,8 @@ def _root() -> pathlib.Path:
     if str(root).startswith("~"):
         raise FileNotFoundError(f"there is no home folder for {asked}")
     root = root.absolute()
-    root.mkdir(mode=0o755, parents=True, exist_ok=True)
+    for folder in reversed([folder for folder in (root, *root.parents) if not folder.exists()]):
+        folder.mkdir(mode=0o755, exist_ok=True)  # one by one: `parents` would be of the umask's mode
     root = root.resolve()
     _check_parents(root)
     return root
@@ -114,16 +116,26 @@ def _claimed(folder: pathlib.Path) -> pathlib.Path:
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode):
         raise NotADirectoryError(f"{folder} is not a folder")
-    if found.st_uid not in (0, os.geteuid()) or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(f"{folder} may have been filled by others")
+    _refuse_foreign(found, folder)
     try:
         os.utime(folder)
         if not (folder / _MARK).exists():
-            (folder / _MARK).write_text(_MARKED)
+            with open(folder / _MARK, "w", opener=_private_to_write) as file:
+                file.write(_MARKED)
     except OSError:
         if not any(folder.rglob("*.nbi")):
             raise
     return folder
+
+
+def _refuse_foreign(found: os.stat_result, path: object) -> None:
+    if found.st_uid not in (0, os.geteuid()) or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"{path} may have been filled by others")
+
+
+def _private_to_write(path: str, flags: int) -> int:
+    """Open a file that nobody else may write to, from its first moment on and whatever the umask is."""
+    return os.open(path, flags | os.O_CLOEXEC, 0o644)
 
 
 def _private_folder(name: str, reason: OSError) -> str:
@@ -215,6 +227,33 @@ class _Files(caching.CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
 
+class _OwnFiles(caching.IndexDataCacheFile):
+    """Numba's files, written so that nobody else may write to them, and read only where nobody else could."""
+
+    def _load_index(self) -> dict:
+        with contextlib.suppress(FileNotFoundError):
+            _refuse_foreign(os.stat(self._cache_path), self._cache_path)
+            _refuse_foreign(os.stat(self._index_path), self._index_path)
+        return super()._load_index()
+
+    def _load_data(self, name: str) -> Any:
+        path = self._data_path(name)
+        _refuse_foreign(os.stat(path), path)
+        return super()._load_data(name)
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        part = f"{filepath}.tmp.{uuid.uuid4().hex[:16]}"
+        try:
+            with open(part, "xb", opener=_private_to_write) as file:
+                yield file
+            os.replace(part, filepath)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(part)
+            raise
+
+
 class _Cache(caching.FunctionCache):
     """Numba's cache, for which neither a full disk nor a damaged file is a reason to stop.
 
@@ -222,6 +261,11 @@ class _Cache(caching.FunctionCache):
     """
 
     _impl_class = _Files
+
+    def __init__(self, function: Callable):
+        super().__init__(function)
+        locator = self._impl.locator
+        self._cache_file = _OwnFiles(self._cache_path, self._impl.filename_base, locator.get_source_stamp())
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:

@@ -6,7 +6,10 @@ import errno
 import fcntl
 import json
 import os
+import re
+import secrets
 import socket
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +20,10 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 LOCK = "training.lock"
 """File that is locked while a folder is held; it says by whom, and stays."""
+
+_PART = ".{name}-{token}.part"
+_OUR_PART = re.compile(r"\..+-[0-9a-f]{16}\.part")
+"""Names of files that are being written, which a killed process leaves behind."""
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -41,16 +48,15 @@ def replace(path: Path, data: bytes) -> None:
     Raises:
         OSError: it cannot be written; the file is as it was.
     """
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    part = path.with_name(_PART.format(name=path.name, token=secrets.token_hex(8)))
     try:
-        with os.fdopen(handle, "wb") as file:
+        with part.open("xb") as file:  # with the mode that the system gives it: the umask need not be known
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
+        os.replace(part, path)
     finally:
-        Path(name).unlink(missing_ok=True)  # gone already where all went well
+        part.unlink(missing_ok=True)  # gone already where all went well
 
 
 def cannot_write(path: object, error: OSError) -> OutputError:
@@ -83,7 +89,8 @@ def readable(name: str, text: str) -> Iterator[Path]:
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder against other processes for as long as the block runs.
 
-    The lock is the operating system's: it ends with the process, however that ends.
+    The lock is the operating system's: it ends with the process, however that ends. What a killed process was writing
+    is removed.
 
     Args:
         folder: which is there.
@@ -105,7 +112,9 @@ def held(folder: Path) -> Iterator[None]:
                 f"{folder} is in use by {_holder(handle)}; wait for that to end, or give another --out"
             ) from None
         except OSError:
-            pass  # a file system without locks: nobody can be kept out
+            pass  # a file system without locks: nobody can be kept out, and what is being written is not touched
+        else:
+            _remove_parts(folder)
         _sign(path, handle)
         yield
     finally:
@@ -139,12 +148,17 @@ def _holder(handle: int) -> str:
     """Say who wrote last into a lock that is taken."""
     try:
         found = json.loads(os.pread(handle, 1000, 0))
-        return f"process {int(found['process'])} on {found['host']:.60}, since {found['since']:.30}"
-    except (OSError, ValueError, KeyError, TypeError):
+        who = f"process {int(found['process'])} on {found['host']:.60}, since {found['since']:.30}"
+    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError):  # as anybody may write it
         return "another process"
+    return who if who.isprintable() else "another process"
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _remove_parts(folder: Path) -> None:
+    """Remove what was being written in a folder when its holder was killed."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            found = entry.stat(follow_symlinks=False)
+            ours = _OUR_PART.fullmatch(entry.name) and stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
+            if ours:
+                os.unlink(entry.path)

@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import pickle
 import pwd
 import runpy
 import shutil
@@ -251,6 +252,60 @@ def test_a_damaged_cache_is_compiled_anew_and_mended(tmp_path, monkeypatch, priv
     third = small(tmp_path, monkeypatch, cache)
     third(21)
     assert third.stats.cache_hits
+
+
+@pytest.fixture
+def no_umask():
+    """As in many containers."""
+    before = os.umask(0)
+    yield
+    os.umask(before)
+
+
+def test_compiled_code_could_be_overwritten_by_anybody_where_the_umask_is_0(tmp_path, monkeypatch, private, no_umask):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "some" / "where"))
+    folder = pathlib.Path(compiled._cache_folder())
+    assert small(tmp_path, monkeypatch, folder)(21) == 42
+    written = [tmp_path / "some", *(tmp_path / "some").rglob("*")]
+    assert {"where", "lock", "CACHEDIR.TAG"} < {path.name for path in written}
+    assert {".nbi", ".nbc"} < {path.suffix for path in written}
+    assert [path for path in written if path.stat().st_mode & 0o022] == []
+
+
+class Planted:
+    """What runs when it is unpickled."""
+
+    def __reduce__(self):
+        return exec, ("raise SystemExit('somebody else's code has run')",)
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("mode", [0o666, 0o664, 0o646])
+def test_code_that_others_may_have_written_is_not_run_but_made_anew(tmp_path, monkeypatch, private, suffix, mode):
+    cache = tmp_path / "cache"
+    cache.mkdir(mode=0o755)
+    small(tmp_path, monkeypatch, cache)(21)
+    (planted,) = cache.rglob(f"*.{suffix}")
+    planted.write_bytes(pickle.dumps(Planted()))
+    planted.chmod(mode)
+    again = small(tmp_path, monkeypatch, cache)
+    assert again(21) == 42
+    assert not again.stats.cache_hits
+    assert [path for path in cache.rglob("*.nb*") if path.stat().st_mode & 0o022] == []
+    third = small(tmp_path, monkeypatch, cache)
+    assert third(21) == 42
+    assert third.stats.cache_hits
+
+
+def test_code_in_a_folder_that_others_may_write_to_is_not_run(tmp_path, monkeypatch, private, capsys):
+    cache = tmp_path / "cache"
+    cache.mkdir(mode=0o755)
+    small(tmp_path, monkeypatch, cache)(21)
+    (index,) = cache.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(Planted()))
+    index.parent.chmod(0o777)
+    assert small(tmp_path, monkeypatch, cache)(21) == 42
+    assert say_once(capsys) == f"{index.parent} may have been filled by others"
 
 
 def test_a_cache_that_can_only_be_read_is_read(tmp_path, monkeypatch, private, capsys):

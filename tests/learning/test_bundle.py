@@ -22,6 +22,7 @@ from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
 from contactsafe.learning.graph import read_graph  # noqa: E402
 from contactsafe.learning.observation import ObservationScaling  # noqa: E402
+from contactsafe.learning.operators import RULES  # noqa: E402
 from contactsafe.learning.policy import Policy  # noqa: E402
 
 H = camera_homography()
@@ -401,6 +402,34 @@ def test_a_value_used_before_it_is_computed_is_refused(bundle):
         model.graph.node.extend(nodes)
 
     assert "before it is computed" in crafted(bundle, turn)
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_operators_without_outputs_are_refused_without_a_traceback(bundle, kind):
+    """A Split was divided by their number."""
+
+    def change(model):
+        model.graph.node.append(onnx.helper.make_node(kind, ["state"], [], axis=1))
+
+    assert crafted(bundle, change) == f"has an operator {kind} without outputs; export it anew"
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_operators_without_inputs_are_refused_without_a_traceback(bundle, kind):
+    def change(model):
+        model.graph.node.append(onnx.helper.make_node(kind, [], ["more"], axis=1))
+
+    assert crafted(bundle, change) == f"has an operator {kind} of a kind that nothing here exports; export it anew"
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, OverflowError, FloatingPointError, IndexError, KeyError])
+def test_no_arithmetic_of_a_rule_ends_in_a_traceback(bundle, monkeypatch, error):
+    def rule(call):
+        raise error
+
+    monkeypatch.setitem(RULES, "Identity", rule)
+    told = crafted(bundle, add_node("Identity"))
+    assert told == "has an operator Identity of a kind that nothing here exports; export it anew"
 
 
 def test_a_model_of_the_runtimes_own_format_is_refused(bundle):

@@ -1,5 +1,6 @@
 """Gravity, ranges and models that hold numbers which are none: refused in one line, or served."""
 
+import copy
 from dataclasses import replace
 
 import mujoco
@@ -77,7 +78,7 @@ def test_limits_that_are_none_are_refused(panda, field, value, text):
 
 
 def test_masses_that_are_none_are_refused(panda):
-    model = mujoco.MjModel.from_xml_string(ELBOW)
+    model = copy.copy(panda.model)
     model.body_mass[1] = np.nan
     with pytest.raises(InvalidInputError, match="body_mass of arm 'panda' has a number that is not finite; mend"):
         replace(panda, model=model)
@@ -98,3 +99,80 @@ def test_range_narrower_than_two_joint_margins_was_42_nm_at_rest_in_its_middle(w
     controller.reset(q)
     torque = controller.step(Measurement(q, np.zeros(2)), Target(arm.tool_pose(q), np.full(6, 150.0), posture=q)).torque
     assert torque[0] < arm.dynamics(q, np.zeros(2))["g"][0]
+
+
+@pytest.mark.parametrize("rate", [np.nan, 0.0, -1.0, 1e-320, np.inf, 1e300])
+def test_torque_rates_that_are_none_gave_a_torque_that_was_none_for_ever(panda, rate):
+    with pytest.raises(InvalidInputError) as caught:
+        replace(panda, torque_rate_max=rate)
+    assert str(caught.value) == (
+        f"torque_rate_max = {rate:g} N m/s; give a number from 1e-06 to 1e+12: 1e9 allows any torque at once"
+    )
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1e9, 1e12])
+def test_the_slowest_and_the_fastest_torque_there_is_are_numbers(panda, rate):
+    arm = replace(panda, torque_rate_max=rate)
+    controller = Controller(arm, presets.safe())
+    controller.reset(arm.home)
+    target = Target(arm.tool_pose(arm.home), np.full(6, 150.0), posture=arm.home + 0.1)
+    for speed in (0.0, 0.1, 0.0):
+        torque = controller.step(Measurement(arm.home, np.full(7, speed)), target).torque
+        assert (np.abs(torque) <= arm.tau_max).all()
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "text"),
+    [
+        (0, np.nan, "friction[1, 0] = nan N m; give φ1 from 0 to 174, twice tau_max[1]"),
+        (0, -0.5, "friction[1, 0] = -0.5 N m; give φ1 from 0 to 174, twice tau_max[1]"),
+        (0, 1e308, "friction[1, 0] = 1e+308 N m; give φ1 from 0 to 174, twice tau_max[1]"),
+        (1, -1.0, "friction[1, 1] = -1 s/rad; give a finite φ2 from 0 on"),
+        (1, np.inf, "friction[1, 1] = inf s/rad; give a finite φ2 from 0 on"),
+        (2, np.nan, "friction[1, 2] = nan rad/s; give a finite φ3"),
+    ],
+)
+def test_friction_that_is_none_or_drives_its_joint_is_refused(panda, column, value, text):
+    friction = panda.friction.copy()
+    friction[1, column] = value
+    with pytest.raises(InvalidInputError) as caught:
+        replace(panda, friction=friction)
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "text"),
+    [
+        ("tau_max", np.zeros(6), "tau_max has shape (6,); give 7 numbers"),
+        ("tau_max", 87.0, "tau_max has shape (); give 7 numbers"),
+        ("tau_max", np.full(7, np.inf), "tau_max[0] = inf N m is no limit; give what the motor can do"),
+        ("q_min", np.zeros((7, 1)), "q_min has shape (7, 1); give 7 numbers"),
+        ("friction", np.zeros((3, 7)), "friction has shape (3, 7); give 7 × 3 numbers"),
+        ("friction", None, "friction has shape (); give 7 × 3 numbers"),
+        ("home", [0.0] * 8, "home has shape (8,); give 7 numbers"),
+        ("home", [np.nan] * 7, "home[0] = nan rad; give a posture well inside the limits"),
+        ("torque_rate_max", "fast", "torque_rate_max is str, not numbers; give one number"),
+        ("torque_rate_max", np.full(7, 1e3), "torque_rate_max has shape (7,); give one number"),
+        ("lever_doubted", np.nan, "lever_doubted = nan m; give a finite number from 0 on"),
+        ("skin", [[0.0] * 6], "skin has shape (1, 6); give 1 × 7 numbers"),
+        ("skin", [[np.inf] * 7], "skin of arm 'panda' has a number that is not finite; give finite points"),
+    ],
+)
+def test_arms_of_another_number_of_joints_or_of_no_numbers_are_refused(panda, field, value, text):
+    with pytest.raises(InvalidInputError) as caught:
+        replace(panda, **{field: value})
+    assert str(caught.value) == text
+
+
+def test_lists_serve_as_arrays(panda):
+    arm = replace(panda, tau_max=panda.tau_max.tolist(), friction=panda.friction.tolist(), torque_rate_max=1000)
+    assert (arm.tau_max == panda.tau_max).all()
+    Controller(arm, presets.safe()).reset(arm.home)
+
+
+@pytest.mark.parametrize("field", ["body_mass", "body_inertia", "dof_armature"])
+def test_negative_masses_are_refused(panda, field):
+    model = copy.copy(panda.model)
+    getattr(model, field)[-1] = -1.0
+    with pytest.raises(InvalidInputError, match=f"^{field} of arm 'panda' has a negative number; mend the model$"):
+        replace(panda, model=model)

@@ -231,9 +231,11 @@ def _check_nodes(nodes: Any, values: dict[str, Value]) -> None:
         unknown = [name for name in node.input if name and name not in values]
         if unknown:
             raise _ModelError(f"uses {shown(unknown[0])} before it is computed")
+        if not node.output:  # some rules divide by their number
+            raise _ModelError(f"has an operator {node.op_type} without outputs")
         try:
             shapes, cost = rule(Call(node, [values[name] if name else None for name in node.input]))
-        except (NotAllowed, IndexError, TypeError, ValueError, OverflowError):
+        except (NotAllowed, ArithmeticError, LookupError, TypeError, ValueError):
             raise _ModelError(f"has an operator {node.op_type} of a kind that nothing here exports") from None
         if len(shapes) != len(node.output) or any(
             len(shape) > MAX_RANK or min(shape, default=1) < 1 for shape in shapes

@@ -14,7 +14,7 @@ from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
 from contactsafe.robot.rotation import matrix_to_quat
 from contactsafe.robot.skin import SKIN_COLUMNS, capsule_skin
-from contactsafe.robot.soundness import refuse_unsound
+from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 
 
 class Pose(NamedTuple):
@@ -60,7 +60,7 @@ class Arm(Independent):
         q_min, q_max: joint range, (n,), rad; ±inf where a joint turns without end.
         qd_max: joint speed limits, (n,), rad/s; inf where unknown.
         tau_max: joint torque limits, (n,), N m.
-        torque_rate_max: N m/s, every joint.
+        torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
         facts: what the model was generated from; None for a user's own.
@@ -70,7 +70,8 @@ class Arm(Independent):
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
     Raises:
-        InvalidInputError: gravity, the model or a limit is not finite, or a joint's range is empty.
+        InvalidInputError: gravity, the model, a limit, friction or home is not finite or not one row a joint, a mass or
+            friction is negative, or a joint's range is empty.
     """
 
     name: str
@@ -89,7 +90,9 @@ class Arm(Independent):
     lever_doubted: float = 0.0
 
     def __post_init__(self):
-        """Refuse what no arm can be."""
+        """Take numbers as arrays, and refuse what no arm can be."""
+        for name, value in as_numbers(self).items():
+            object.__setattr__(self, name, value)
         refuse_unsound(self)
 
     @property
@@ -169,9 +172,13 @@ def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
     Raises:
         InvalidInputError: naming what was found and what is allowed.
     """
+<<<<<<< HEAD
     array = real_array(value, name, shape)
     if array.shape != shape:
         raise InvalidInputError(f"{name} has shape {array.shape}; give {_words(shape)}")
+=======
+    array = array_of(value, shape, name, "finite ")
+>>>>>>> filefix
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"[{', '.join(map(str, index))}]" if index else ""
@@ -182,10 +189,6 @@ def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
 def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Give a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
     return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
-
-
-def _words(shape: tuple[int, ...]) -> str:
-    return " × ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"
 
 
 def arm_from_facts(facts: ArmFacts, tool: Tool) -> Arm:

@@ -3,24 +3,85 @@
 import numpy as np
 
 from contactsafe.errors import InvalidInputError
+from contactsafe.robot.skin import SKIN_COLUMNS
 
 _MODEL = (
     "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
     "dof_armature", "site_pos", "site_quat", "qpos0",
 )  # fmt: skip
 
+_NOT_NEGATIVE = ("body_mass", "body_inertia", "dof_armature")
+
 _GRAVITY_MAX = 1e3
+
+_TORQUE_RATES = (1e-6, 1e12)
+"""N m/s; beyond, what is divided by one is no number."""
+
+_PER_JOINT = {"q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": ()}
+"""What an arm has of every joint, and the shape of it."""
+
+
+def as_numbers(arm) -> dict[str, np.ndarray | float]:
+    """Give an arm's fields that are numbers, as such: arrays of one row a joint, and floats.
+
+    Args:
+        arm: `Arm`, as it was given.
+
+    Raises:
+        InvalidInputError: a field is not numbers, or of another shape.
+    """
+    n = int(arm.model.nv)
+    fields = {name: array_of(getattr(arm, name), (n, *row), name) for name, row in _PER_JOINT.items()}
+    single = {name: float(array_of(getattr(arm, name), (), name)) for name in ("torque_rate_max", "lever_doubted")}
+    points = len(arm.skin) if hasattr(arm.skin, "__len__") else 0
+    return {**fields, **single, "skin": array_of(arm.skin, (points, SKIN_COLUMNS), "skin")}
+
+
+def array_of(value, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
+    """Copy numbers into an array of a shape.
+
+    Args:
+        value: what was given.
+        shape: of the array.
+        name: what to call it in errors.
+        kind: of the numbers, in errors: "finite " or nothing.
+
+    Raises:
+        InvalidInputError: they are no numbers, or of another shape.
+    """
+    wanted = f"{' × '.join(map(str, shape))} {kind}numbers" if shape else f"one {kind}number"
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {wanted}") from None
+    if array.shape != shape:
+        raise InvalidInputError(f"{name} has shape {array.shape}; give {wanted}")
+    return array
 
 
 def refuse_unsound(arm) -> None:
     """Check what an arm is made of.
 
     Args:
-        arm: `Arm`, as it was given.
+        arm: `Arm`, whose numbers are as `as_numbers` gives them.
 
     Raises:
-        InvalidInputError: gravity, the model or a limit is not finite, or a joint's range is empty.
+        InvalidInputError: gravity, the model, a limit, friction, home or skin is not finite, a mass or friction is
+            negative, or a joint's range is empty.
     """
+    _refuse_unsound_model(arm)
+    _refuse_unsound_limits(arm)
+    _refuse_unsound_friction(arm)
+    for i, position in enumerate(arm.home):
+        if not np.isfinite(position):
+            raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
+    if not np.isfinite(arm.skin).all():
+        raise InvalidInputError(f"skin of arm '{arm.name}' has a number that is not finite; give finite points")
+    if not 0.0 <= arm.lever_doubted < np.inf:
+        raise InvalidInputError(f"lever_doubted = {arm.lever_doubted:g} m; give a finite number from 0 on")
+
+
+def _refuse_unsound_model(arm) -> None:
     gravity = arm.model.opt.gravity
     if not (np.abs(gravity) < _GRAVITY_MAX).all():
         raise InvalidInputError(
@@ -29,6 +90,11 @@ def refuse_unsound(arm) -> None:
     for name in _MODEL:
         if not np.isfinite(getattr(arm.model, name)).all():
             raise InvalidInputError(f"{name} of arm '{arm.name}' has a number that is not finite; mend the model")
+        if name in _NOT_NEGATIVE and (getattr(arm.model, name) < 0.0).any():
+            raise InvalidInputError(f"{name} of arm '{arm.name}' has a negative number; mend the model")
+
+
+def _refuse_unsound_limits(arm) -> None:
     for i, (low, high) in enumerate(zip(arm.q_min, arm.q_max, strict=True)):
         if not low < high:  # NaN as well
             raise InvalidInputError(
@@ -39,6 +105,27 @@ def refuse_unsound(arm) -> None:
         for i, limit in enumerate(getattr(arm, name)):
             if not limit > 0.0:
                 raise InvalidInputError(f"{name}[{i}] = {limit:g} {unit} is no limit; give a number greater than 0")
+    for i, limit in enumerate(arm.tau_max):
+        if limit == np.inf:
+            raise InvalidInputError(f"tau_max[{i}] = inf N m is no limit; give what the motor can do")
+    least, most = _TORQUE_RATES
+    if not least <= arm.torque_rate_max <= most:
+        raise InvalidInputError(
+            f"torque_rate_max = {arm.torque_rate_max:g} N m/s; give a number from {least:g} to {most:g}: "
+            "1e9 allows any torque at once"
+        )
+
+
+def _refuse_unsound_friction(arm) -> None:
+    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is what it takes both ways together."""
+    for i, (phi1, phi2, phi3) in enumerate(arm.friction):
+        most = 2.0 * arm.tau_max[i]
+        if not 0.0 <= phi1 <= most:
+            raise InvalidInputError(f"friction[{i}, 0] = {phi1:g} N m; give φ1 from 0 to {most:g}, twice tau_max[{i}]")
+        if not 0.0 <= phi2 < np.inf:
+            raise InvalidInputError(f"friction[{i}, 1] = {phi2:g} s/rad; give a finite φ2 from 0 on")
+        if not np.isfinite(phi3):
+            raise InvalidInputError(f"friction[{i}, 2] = {phi3:g} rad/s; give a finite φ3")
 
 
 def _listed(numbers) -> str:
