@@ -11,9 +11,10 @@ from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtyp
 from contactsafe.control.tick import tick_at
 from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
-from contactsafe.robot.arm import Arm, Pose, finite_array, real_array
+from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.payload import Payload, carrying, checked_payload
+from contactsafe.robot.soundness import array_of
 
 RANGE_TOLERANCE = 0.02
 """Joints may be measured this far past their limit at reset, rad: simulators' limits are soft, and encoders are off."""
@@ -433,10 +434,9 @@ def _taken_down(value):
 
 def _shaped(value, n: int, name: str) -> np.ndarray:
     """Check a measurement's shape only: numbers that are not finite are the tick's to refuse, the arm must not drop."""
-    array = value if type(value) is np.ndarray and value.dtype == float else real_array(value, name, (n,))
-    if array.shape != (n,):
-        raise InvalidInputError(f"{name} has shape {array.shape}; give {n} numbers")
-    return array
+    if type(value) is np.ndarray and value.dtype == float and value.shape == (n,):
+        return value
+    return array_of(value, (n,), name)
 
 
 def _seconds(value) -> float:

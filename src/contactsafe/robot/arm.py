@@ -151,34 +151,13 @@ class Arm(Independent):
         return out[0]
 
 
-def real_array(value, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Make a float array of whatever holds real numbers.
-
-    Raises:
-        InvalidInputError: it holds something else; `shape` is what is asked for.
-    """
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind != "c":
-            return np.array(given, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {_words(shape)}")
-
-
 def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
     """Check an array at the door: its shape, and that every number is finite.
 
     Raises:
         InvalidInputError: naming what was found and what is allowed.
     """
-<<<<<<< HEAD
-    array = real_array(value, name, shape)
-    if array.shape != shape:
-        raise InvalidInputError(f"{name} has shape {array.shape}; give {_words(shape)}")
-=======
     array = array_of(value, shape, name, "finite ")
->>>>>>> filefix
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"[{', '.join(map(str, index))}]" if index else ""

@@ -51,9 +51,12 @@ def array_of(value, shape: tuple[int, ...], name: str, kind: str = "") -> np.nda
     """
     wanted = f"{' × '.join(map(str, shape))} {kind}numbers" if shape else f"one {kind}number"
     try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {wanted}") from None
+        given = np.asarray(value)
+        array = np.array(given, dtype=float) if given.dtype.kind != "c" else None
+    except (TypeError, ValueError, OverflowError):
+        array = None
+    if array is None:
+        raise InvalidInputError(f"{name} is {type(value).__name__}, not numbers; give {wanted}")
     if array.shape != shape:
         raise InvalidInputError(f"{name} has shape {array.shape}; give {wanted}")
     return array
