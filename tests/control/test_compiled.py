@@ -276,7 +276,7 @@ class Planted:
     """What runs when it is unpickled."""
 
     def __reduce__(self):
-        return exec, ("raise SystemExit('somebody else's code has run')",)
+        return exec, ("raise SystemExit('foreign code has run')",)
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
