@@ -2,14 +2,15 @@
 
 A measurement is held against the last good one: joints move between the two no faster and no slower than both
 velocities say. What does not fit, is missing, or is the very last one again is bridged: the nominal dynamics predict
-where the arm is. After `BRIDGE_TICKS` the arm is braked. `docs/concepts/clocks.md` derives the bounds.
+where the arm is. After `BRIDGE_TICKS` the arm is braked. A clock that stands or goes back while joints move is wrong:
+then the joints tell the time. `docs/concepts/clocks.md` derives the bounds.
 """
 
 import math
 
 from contactsafe.compiled import compiled
 from contactsafe.control.laws import task_error
-from contactsafe.control.records import CONTACT, MISSING, OVERDUE, REPEATED, UNTRUE
+from contactsafe.control.records import CLOCK, CONTACT, MISSING, OVERDUE, REPEATED, UNTRUE
 from contactsafe.robot.linalg import dot, matvec, matvec_into, matvec_t_into
 from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, rotvec_to_quat
 from contactsafe.robot.stack import stack_vector
@@ -63,18 +64,19 @@ def receive(c, usable):
     """
     state = c.state
     usual = 1.0 if abs(state.pace - 1.0) < _SAME_PACE else state.pace
-    reason, since = _judge(c, state.since + usual) if usable else (MISSING, state.since + usual)
+    reason, since, timed = _judge(c, state.since + usual) if usable else (MISSING, state.since + usual, False)
     if state.braking != 0 and reason == UNTRUE:
         reason, state.rests = 0, 0  # whatever is measured now is where the arm is
     if reason == 0:
-        _accept(c, since)
+        _accept(c, since, timed)
     else:
         _predict(c, usual * c.params.dt)
         state.elapsed = usual
         state.since += usual
         state.bridged += 1
     overdue = reason == 0 and since > _OVERDUE_TICKS
-    lasting = reason != 0 and state.since > BRIDGE_TICKS + 0.5 and (reason != REPEATED or _should_have_moved(state))
+    resting = reason == REPEATED and since > 0.0 and not _should_have_moved(state)
+    lasting = reason != 0 and not resting and state.since > BRIDGE_TICKS + 0.5
     if (overdue or lasting) and state.braking == 0:
         state.braking, state.rests = 1, 0
         state.fault = OVERDUE if overdue else reason
@@ -83,7 +85,9 @@ def receive(c, usable):
 
 @compiled
 def _judge(c, ticks):
-    """Tell what is wrong with the measurement, 0 for nothing, and how many ticks passed since the last good one.
+    """Tell what is wrong with the measurement, how many ticks passed since the last good one, whether a clock says so.
+
+    Nothing is wrong: 0. No tick passed where it is the last one again by its time as well.
 
     Args:
         c: `controller_dtype` record.
@@ -92,26 +96,49 @@ def _judge(c, ticks):
     state, m = c.state, c.measurement
     state.unclear = 0
     if state.started == 0:
-        return 0, 1.0
-    timed = m.has_time != 0 and state.timed != 0
+        return 0, 1.0, False
+    unchanged, timed = _is_unchanged(state, m), m.has_time != 0 and state.timed != 0
+    if timed and unchanged and abs(m.time - state.time) <= _SAME_TIME_TICKS * c.params.dt:
+        return REPEATED, 0.0, True
     if timed:
-        ticks = (m.time - state.time) / c.params.dt
-        if not ticks > _SAME_TIME_TICKS:
-            return REPEATED, ticks
-    if _same_again(state, m):
-        return REPEATED, ticks
+        told = _ticks_told(c)
+        timed = _is_believed(state, told)
+        ticks = told if timed else ticks
+    if unchanged and _moves(m):
+        return REPEATED, ticks, timed
     if ticks > _OVERDUE_TICKS:
-        return 0, ticks
+        return 0, ticks, timed
     astray = _astray(c, ticks)
     if astray > _SLACK_RAD:
         late = 0.0 if timed else _ticks_from_motion(c, ticks)
         if late > 0.0:
-            return 0, late
+            return 0, late, False
         if astray > _UNTRUE_RAD * max(ticks, 1.0) or (not timed and _out_of_reach(c)):
-            return UNTRUE, ticks
+            return UNTRUE, ticks, timed
         state.unclear = 1 if ticks > 1.5 and not timed else 0
-        return 0, ticks
-    return (UNTRUE if _velocity_jumps(c, ticks) else 0), ticks
+        return 0, ticks, timed
+    return (UNTRUE if _velocity_jumps(c, ticks) else 0), ticks, timed
+
+
+@compiled
+def _ticks_told(c):
+    """Ticks since the last good measurement by its time and that of this one."""
+    state = c.state
+    return (c.measurement.time - state.time) / c.params.dt - state.lead
+
+
+@compiled
+def _is_believed(state, told):
+    """Tell whether a clock is believed by which so many ticks passed; latch the fault of one that did not go on.
+
+    Such a one is not believed either, until reset, where it is far ahead: that is no reason to brake.
+    """
+    if not told > _SAME_TIME_TICKS:
+        state.doubted = 1
+        if state.fault == 0:
+            state.fault = CLOCK
+        return False
+    return state.doubted == 0 or told <= _OVERDUE_TICKS
 
 
 @compiled
@@ -136,14 +163,21 @@ def all_usable(x):
 
 
 @compiled
-def _same_again(state, m):
-    """Tell whether a moving arm's measurement is the last one to the bit: noise and motion never repeat."""
-    moving = False
+def _is_unchanged(state, m):
+    """Tell whether all joints are measured as before to the bit."""
     for i in range(m.q.shape[0]):
         if m.q[i] != state.q_good[i] or m.qd[i] != state.qd_good[i]:
             return False
-        moving = moving or abs(m.qd[i]) > _AT_REST_RAD_S
-    return moving
+    return True
+
+
+@compiled
+def _moves(m):
+    """Tell whether a joint moves: noise and motion never repeat, a simulator at rest does."""
+    for i in range(m.qd.shape[0]):
+        if abs(m.qd[i]) > _AT_REST_RAD_S:
+            return True
+    return False
 
 
 @compiled
@@ -210,17 +244,24 @@ def _ticks_from_motion(c, ticks):
 
 
 @compiled
-def _accept(c, since):
+def _accept(c, since, timed):
+    """Take the measurement over; `timed` where its clock told how many ticks passed.
+
+    A clock that stands or stutters is counted on, one that was set anew goes on from there.
+    """
     state, m = c.state, c.measurement
     if state.started == 0:
         state.pace, state.pace_variance = 1.0, _PACE_UNKNOWN
-    elif m.has_time != 0 and state.timed != 0:
-        state.pace += 0.1 * (min(since, state.pace + 1.0) - state.pace)
+    elif timed:
+        state.pace += 0.1 * (min(since / (state.bridged + 1.0), state.pace + 1.0) - state.pace)
     elif state.bridged == 0:
         _learn_pace(c)
     state.elapsed = min(max(since - state.since, 0.0), BRIDGE_TICKS + 1.0)
     if state.bridged > 0 or since > _OVERDUE_TICKS:
         state.rests = 0  # a brake that holds a place that was predicted lets go of it
+    disbelieved = not timed and m.has_time != 0 and state.timed != 0
+    told = _ticks_told(c) if disbelieved else since
+    state.lead = since - told if abs(told) <= _OVERDUE_TICKS else 0.0
     state.since, state.bridged = since, 0
     state.q[:], state.qd[:] = m.q, m.qd
     state.q_good[:], state.qd_good[:] = m.q, m.qd

@@ -35,7 +35,7 @@ _FASTER = 5.0
 """Multiple of a joint's speed limit at which its measured speed is not believed."""
 
 BAD_MEASUREMENT, BAD_TARGET, BAD_QUATERNION, BAD_GAIN, MISSING, NO_TORQUE = 1, 2, 3, 4, 5, 6
-REPEATED, OVERDUE, UNTRUE, LOAD, RUNAWAY = 7, 8, 9, 10, 11
+REPEATED, OVERDUE, UNTRUE, LOAD, RUNAWAY, CLOCK = 7, 8, 9, 10, 11, 12
 """Faults, see `FAULTS`."""
 
 LIMITED_BY_CONTACT, LIMITED_BY_TOOL_FORCE, LIMITED_BY_ENERGY, LIMITED_BY_RATE, LIMITED_BY_RANGE = 1, 2, 4, 8, 16
@@ -60,11 +60,12 @@ FAULTS = {
     BAD_GAIN: "target stiffness or damping is out of range; the last good target holds",
     MISSING: "measurements stayed unusable for over 20 ticks; the arm was braked until reset",
     NO_TORQUE: "the law gave no finite torque; the last torque was repeated",
-    REPEATED: "the measurement did not change for over 20 ticks of motion; the arm was braked until reset",
+    REPEATED: "the same measurement of motion, or with its time, for over 20 ticks; the arm was braked until reset",
     OVERDUE: "over 20 ticks passed between two measurements; the arm was braked until reset",
     UNTRUE: "measurements contradict each other, or go on elsewhere, for over 20 ticks; the arm was braked until reset",
     LOAD: "a load that the controller was not told of keeps the tool below its target; see payload_estimate()",
     RUNAWAY: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
+    CLOCK: "the time of a measurement stood or went back while the joints went on; they tell the time instead",
 }
 """What `fault` in the state and output means. The first is latched until reset, but what brakes the arm replaces it:
 MISSING, REPEATED, OVERDUE, UNTRUE and RUNAWAY; and LOAD goes once the load is told."""
@@ -184,6 +185,8 @@ def _clocked(n: int) -> list[tuple]:
         ("qd_good", _f, (n,)),  # rad/s
         ("time", _f),  # of it, s
         ("timed", _i),  # 0 where that is not known
+        ("lead", _f),  # of the time as counted on it, where the clock is wrong, ticks
+        ("doubted", _i),  # 1 once the clock was wrong, until reset
         ("pace", _f),  # ticks of time that a call usually comes to
         ("pace_variance", _f),
         ("elapsed", _f),  # ticks of time that passed since the last tick
