@@ -191,6 +191,11 @@ def test_words_that_make_no_sense_are_told_in_one_line_too(words, text, capsys):
     assert (out, err) == ("", f"contactsafe: {text}\n")
 
 
+def test_a_word_in_place_of_a_number_or_nothing_is_told_plainly(capsys):
+    assert main(["experiment", "collisions", "--trials", "x"]) == 2
+    assert capsys.readouterr().err.startswith("contactsafe: --trials: 'x' is not a whole number; ")
+
+
 def test_a_task_that_gymnasium_does_not_know_is_told_in_one_line(capsys):
     pytest.importorskip("torch")
     assert main(["train", "ppo", "--env-id", "CartPole-v1"]) == 2

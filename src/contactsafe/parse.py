@@ -20,6 +20,7 @@ _PLAINER: dict[str, str | Callable[[re.Match], str]] = {
     r"Error parsing (--[\w.-]+): ": r"\1: ",
     r"Error parsing (\w+|\{.*?\}): ": "",
     r"Missing value for argument '(.*?)'\. Expected .*": r"\1: its value is missing",
+    r"no type matching \S+ could be instantiated from \['.*?'\]\. Got errors: - <class '\w+'>: ": "",
     r"invalid literal for int\(\) with base 10: ('.*?')": r"\1 is not a whole number",
     r"Could not find valid parse for arguments: (\[.*?\])": r"\1 makes no sense",
     r"could not convert string to float: ('.*?')": r"\1 is not a number",

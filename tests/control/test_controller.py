@@ -193,6 +193,21 @@ def test_a_target_that_stays_as_it_is_costs_no_search(panda, monkeypatch):
     controller.step(measured, target._replace(pose=Pose(target.pose.position.copy(), target.pose.quat.copy())))
 
 
+@pytest.mark.parametrize(
+    ("posture", "told"),
+    [(np.full(7, 5.0), "give one within the range"), ("degrees", "these are degrees, give radians")],
+)
+def test_a_posture_that_the_arm_cannot_have(panda, controller, posture, told):
+    posture = np.degrees(panda.home) if isinstance(posture, str) else posture
+    text = refusal(controller.step, Measurement(panda.home, np.zeros(7)), hold(panda)._replace(posture=posture))
+    assert text.startswith("posture[")
+    assert text.endswith(told)
+
+
+def test_a_speed_that_the_arm_cannot_have_at_reset(panda, controller):
+    assert "faster than this arm gets" in refusal(controller.reset, panda.home, np.full(7, 100.0))
+
+
 def test_pose_out_of_reach_without_a_posture(panda, controller):
     far = Target(Pose(np.array([3.0, 0.0, 0.5]), np.array([0.0, 1.0, 0.0, 0.0])), STIFFNESS)
     text = refusal(controller.set_target, far, error=UnreachableError)

@@ -46,6 +46,19 @@ def test_unusable_measurement_is_bridged(running, field, value):
     )
 
 
+def test_a_broken_force_sensor_made_the_arm_blind_to_its_joints(panda):
+    """It is braked, and by its joints: without stiction a blind brake drifted by a metre."""
+    plant, controller = Plant(panda), controller_at(panda, CONFIG)
+    target, broken = reach(panda, [0.1, 0.0, 0.0]), np.full(6, np.nan)
+    plant.run(controller, target, 300, np.zeros(6))
+    out = plant.run(controller, target, 1500, broken)
+    assert out.braked
+    assert out.fault == FAULTS[5]
+    assert out.bridged == 0
+    assert np.abs(plant.qd).max() < 0.01
+    assert np.linalg.norm(plant.tool_position() - panda.tool_pose(panda.home).position) < 0.15
+
+
 def test_a_wrench_that_is_not_measured_is_not_looked_at(running):
     _, records = running
     records[0]["measurement"]["wrench_ee"] = np.nan

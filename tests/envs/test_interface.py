@@ -168,7 +168,8 @@ def test_rendering_is_the_mask_enlarged():
     ("action", "text"),
     [
         (np.full(18, np.nan), "actions hold a number that is not finite; every action must be in [-1, 1]"),
-        (np.zeros(17), "actions have shape (1, 17); give (1, 18)"),
+        (np.zeros(17), "actions has shape (1, 17); give 1 × 18 numbers"),
+        ("left", "actions is ndarray, not numbers; give 1 × 18 numbers"),
     ],
 )
 def test_bad_actions_are_refused_and_change_nothing(env, action, text):
@@ -180,7 +181,14 @@ def test_bad_actions_are_refused_and_change_nothing(env, action, text):
     assert_array_equal(env.unwrapped.tasks.worlds.controllers["target"], before["target"])
 
 
-def test_no_environment_at_all_is_refused():
+@pytest.mark.parametrize("count", [0, -1, 1.5, "3", None])
+def test_no_number_of_environments_is_refused(count):
     with pytest.raises(InvalidInputError) as caught:
-        WipingVectorEnv(0)
-    assert str(caught.value) == "num_envs = 0; give 1 or more"
+        WipingVectorEnv(count)
+    assert str(caught.value) == f"num_envs = {count!r}; give a whole number from 1 on"
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 0.0, 0.001, 1e9, np.inf, np.nan, "long"])
+def test_no_length_of_an_episode_is_refused(seconds):
+    with pytest.raises(InvalidInputError, match="episode_s"):
+        WipingConfig(episode_s=seconds)

@@ -143,14 +143,17 @@ def _is_believed(state, told):
 
 @compiled
 def is_usable(c):
-    """Tell whether every number of the measurement is one that this arm can have."""
+    """Tell whether every number of the measurement is one that this arm can have.
+
+    A broken force sensor stops the arm, but it is braked by its joints, which are still seen.
+    """
     m, params = c.measurement, c.params
     for i in range(m.q.shape[0]):
         if not (params.q_least[i] <= m.q[i] <= params.q_most[i] and abs(m.qd[i]) <= params.qd_most[i]):
             return False
     if m.has_time != 0 and not math.isfinite(m.time):
         return False
-    return m.has_wrench == 0 or all_usable(m.wrench_ee)
+    return m.has_wrench == 0 or c.state.braking != 0 or all_usable(m.wrench_ee)
 
 
 @compiled
@@ -266,8 +269,8 @@ def _accept(c, since, timed):
     state.q[:], state.qd[:] = m.q, m.qd
     state.q_good[:], state.qd_good[:] = m.q, m.qd
     state.time, state.timed = m.time, m.has_time
-    state.has_wrench = m.has_wrench
-    if m.has_wrench != 0:
+    state.has_wrench = 1 if m.has_wrench != 0 and all_usable(m.wrench_ee) else 0
+    if state.has_wrench != 0:
         state.wrench_ee[:] = m.wrench_ee
 
 

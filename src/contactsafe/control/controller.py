@@ -91,13 +91,14 @@ class Output(NamedTuple):
         torque: joint command including gravity, (n,), N m.
         contact: on the arm.
         residual: estimated external joint torque the law compensates, (n,), N m.
-        error: x_d − x, position and rotation vector, (6,), m and rad.
+        error: x_d − x, position and rotation vector, (6,), m and rad; of the arm as predicted while `bridged` is not 0.
         limited_by: what took something off the task or the command: some of 'contact' (the bound on the push along
             it), 'tool force' (`push_tool_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range' (joint
             range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
         fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
         bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
         target_late: whether no new target came for so long that the tool is brought to rest.
+        braked: whether the arm is braked until `reset`, for the reason that `fault` gives.
     """
 
     torque: np.ndarray
@@ -108,6 +109,7 @@ class Output(NamedTuple):
     fault: str
     bridged: int = 0
     target_late: bool = False
+    braked: bool = False
 
 
 class Controller(Independent):
@@ -174,8 +176,8 @@ class Controller(Independent):
             InvalidInputError: a wrong shape, a number that is not finite, joints outside their range, or more torque
                 than the arm's limit.
         """
-        q = self._in_range(self.arm.joint_vector(q, "q"))
-        qd = np.zeros(self.arm.n) if qd is None else self.arm.joint_vector(qd, "qd")
+        q = self._in_range(self.arm.joint_vector(q, "q"), "q")
+        qd = np.zeros(self.arm.n) if qd is None else self._believable(self.arm.joint_vector(qd, "qd"))
         dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else self._within_limit(torque)
         for part in ("state", "output", "measurement"):
@@ -267,18 +269,29 @@ class Controller(Independent):
             return checked_payload(0.0)
         return Payload(mass, (known.mass * known.com + state["load"][1:]) / mass, np.zeros((3, 3)))
 
-    def _in_range(self, q: np.ndarray) -> np.ndarray:
+    def _believable(self, qd: np.ndarray) -> np.ndarray:
+        most = self.record["params"]["qd_most"]
+        if (np.abs(qd) <= most).all():
+            return qd
+        i = int(np.argmax(np.abs(qd) > most))
+        raise InvalidInputError(
+            f"qd[{i}] = {qd[i]:.4g} rad/s is faster than this arm gets, {most[i]:.4g}; give rad/s"
+        )
+
+    def _in_range(self, q: np.ndarray, name: str) -> np.ndarray:
         past = self._past_limits(q)
         if (past <= RANGE_TOLERANCE).all():
             return q
         i = int(np.argmax(past > RANGE_TOLERANCE))
         low, high = self.arm.q_min[i], self.arm.q_max[i]
         remedy = "move the joint back by hand or in the robot's own mode, or correct the arm's range"
+        if name != "q":
+            remedy = "give one within the range"
         if np.abs(q).max() > 2.0 * np.pi and (self._past_limits(np.radians(q)) <= 0.0).all():
             remedy = "these are degrees, give radians"
         limit = f"above its limit {high:.4f}" if q[i] > high else f"below its limit {low:.4f}"
         raise InvalidInputError(
-            f"q[{i}] = {q[i]:.4f} rad, joint '{self.arm.model.joint(i).name}', is {past[i]:.4f} rad {limit}; "
+            f"{name}[{i}] = {q[i]:.4f} rad, joint '{self.arm.model.joint(i).name}', is {past[i]:.4f} rad {limit}; "
             f"{RANGE_TOLERANCE} is tolerated: {remedy}"
         )
 
@@ -346,7 +359,7 @@ class Controller(Independent):
         if target.posture is None:
             posture = self._ik.posture_near(Pose(position, quat), record["q_pose"].copy())
         else:
-            posture = self.arm.joint_vector(target.posture, "posture")
+            posture = self._in_range(self.arm.joint_vector(target.posture, "posture"), "posture")
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers
@@ -391,6 +404,7 @@ class Controller(Independent):
             fault=FAULTS[int(out["fault"])],
             bridged=int(out["bridged"]),
             target_late=bool(out["target_late"]),
+            braked=bool(out["braked"]),
         )
 
 

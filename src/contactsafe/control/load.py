@@ -11,7 +11,8 @@ import numpy as np
 from contactsafe.compiled import compiled
 from contactsafe.control.estimate import CORRELATED, NOISE_NM, expect_masses
 from contactsafe.control.laws import weigh
-from contactsafe.control.records import LOAD
+from contactsafe.control.records import FREE, LOAD
+from contactsafe.control.supervisor import enter
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.linalg import cross_into, dot, matvec_into, matvec_t_into
 from contactsafe.robot.stack import stack_vector
@@ -44,6 +45,9 @@ _REACH_M = 0.4
 
 _SAGS_M = 0.008
 _SAGS_S = 1.0
+_LOST = 0.4
+"""A tool that misses this much of what it is said to carry does not merely press on something."""
+
 _RISES_M_S = 0.01
 """A tool that a load keeps so far below its target for so long, and that rises no faster, is a fault."""
 
@@ -175,14 +179,19 @@ def _is_load(state, known_kg):
 
 @compiled
 def _watch_sag(c):
-    """Latch a fault where a load that nobody told of keeps the tool below its target, or draws it further down."""
+    """Latch a fault where a load that nobody told of keeps the tool below its target, or draws it further down.
+
+    Or above, where what the tool is said to carry is not there. It takes the place of faults that are over.
+    """
     state, error, gravity = c.state, c.output.error, c.handle.gravity
     size = math.sqrt(dot(error[:3], error[:3]))
-    down = max(math.sqrt(dot(gravity, gravity)), 1e-9)
-    above, sinking = -dot(error[:3], gravity) / down, dot(c.dynamics.velocity[:3], gravity) / down
-    sags = state.loaded != 0 and state.load[0] > 0.0 and size > _SAGS_M and above > 0.5 * size and sinking > -_RISES_M_S
+    side = 1.0 if state.load[0] > 0.0 else -1.0
+    down = side * max(math.sqrt(dot(gravity, gravity)), 1e-9)
+    against, sinking = -dot(error[:3], gravity) / down, dot(c.dynamics.velocity[:3], gravity) / down
+    much = state.load[0] > 0.0 or -state.load[0] > _LOST * c.payload.mass
+    sags = state.loaded != 0 and much and size > _SAGS_M and against > 0.5 * size and sinking > -_RISES_M_S
     state.sags_s = state.sags_s + state.step.dt if sags else 0.0
-    if state.sags_s > _SAGS_S and state.fault == 0:
+    if state.sags_s > _SAGS_S and state.braking == 0 and state.runaway == 0:
         state.fault = LOAD
 
 
@@ -218,6 +227,8 @@ def take_up(controllers, index, weight):
     if state.has_wrench == 0:
         for k in range(3):
             state.tool_force[k] -= share * (new_weight[k] - weight[k])
+    if trigger_share > 0.5:  # what was a contact was the load; what else there is shows at once
+        enter(state, FREE)
     expect_masses(c)
     expect_load(state)
     if state.fault == LOAD:

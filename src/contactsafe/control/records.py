@@ -63,12 +63,12 @@ FAULTS = {
     REPEATED: "the same measurement of motion, or with its time, for over 20 ticks; the arm was braked until reset",
     OVERDUE: "over 20 ticks passed between two measurements; the arm was braked until reset",
     UNTRUE: "measurements contradict each other, or go on elsewhere, for over 20 ticks; the arm was braked until reset",
-    LOAD: "a load that the controller was not told of keeps the tool below its target; see payload_estimate()",
+    LOAD: "a load, or a push like one, that the controller was not told of keeps the tool off; see payload_estimate()",
     RUNAWAY: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
     CLOCK: "the time of a measurement stood or went back while the joints went on; they tell the time instead",
 }
 """What `fault` in the state and output means. The first is latched until reset, but what brakes the arm replaces it:
-MISSING, REPEATED, OVERDUE, UNTRUE and RUNAWAY; and LOAD goes once the load is told."""
+MISSING, REPEATED, OVERDUE, UNTRUE and RUNAWAY; and so does LOAD where nothing brakes, which goes once it is told."""
 
 
 def measurement_dtype(n: int) -> np.dtype:
@@ -310,6 +310,7 @@ def output_dtype(n: int) -> np.dtype:
             ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command
             ("bridged", _i),  # ticks in a row whose measurement was predicted
             ("target_late", _i),  # 1 where no new target came for too long
+            ("braked", _i),  # 1 where the arm is braked, until reset
             ("fault", _i),
         ]
     )

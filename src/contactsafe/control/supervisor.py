@@ -43,9 +43,9 @@ def supervise(c):
     state.quiet_ticks = 0 if left != 0 else state.quiet_ticks + ticks
     if state.mode == FREE:
         if link != 0 and params.contact_aware != 0:
-            _enter(state, CONTACT)
+            enter(state, CONTACT)
     elif state.mode_ticks >= params.dwell_ticks and state.quiet_ticks > params.release_ticks:
-        _enter(state, FREE)
+        enter(state, FREE)
     if state.mode == CONTACT and link != 0:
         state.direction[:] = state.arm_torque_trigger / _size(state.arm_torque_trigger)
         _locate(c, link)
@@ -101,7 +101,8 @@ def _take_link(c, link, lever, share):
 
 
 @compiled
-def _enter(state, mode):
+def enter(state, mode):
+    """Begin a mode anew."""
     state.mode, state.mode_ticks = mode, 0
     state.moved_rad, state.moved_smooth_rad, state.torque_smooth_nm, state.reference_nm = 0.0, 0.0, 0.0, 0.0
     state.contact_link, state.search_at = 0, 0

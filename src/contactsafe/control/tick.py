@@ -145,7 +145,7 @@ def _wait(c):
         limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step, c.dynamics.M_inv)
         state.tau[:] = tau
     c.output.torque[:] = state.tau
-    c.output.fault, c.output.bridged = state.fault, state.bridged
+    c.output.fault, c.output.bridged, c.output.braked = state.fault, state.bridged, state.braking
 
 
 @compiled
@@ -430,3 +430,4 @@ def _finish(c, tau):
     out.velocity[:] = dynamics.velocity
     out.mode, out.holding, out.fault = state.mode, state.holding, state.fault
     out.target_late = state.target_late
+    out.braked = 1 if state.braking != 0 or state.runaway != 0 else 0

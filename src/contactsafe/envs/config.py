@@ -119,7 +119,9 @@ class WipingConfig:
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self):
-        """Refuse a kind of board or of sight that there is not."""
+        """Refuse a time limit, a kind of board or of sight that cannot be."""
         check_boards(self.boards)
+        if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
+            raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
         if self.sight not in get_args(Sight):
             raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")

@@ -17,6 +17,7 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.posture import posture_rule
+from contactsafe.robot.soundness import array_of
 from contactsafe.sim.camera import camera_at
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import draw_board
@@ -190,9 +191,7 @@ class WipingTasks(Independent):
             InvalidInputError: wrong shape, or not finite.
         """
         worlds = self.worlds
-        actions = np.asarray(actions, dtype=float)
-        if actions.shape != self._actions.shape:
-            raise InvalidInputError(f"actions have shape {actions.shape}; give {self._actions.shape}")
+        actions = array_of(actions, self._actions.shape, "actions")
         if not np.isfinite(actions).all():
             raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
         self._actions[:] = actions

@@ -1,7 +1,7 @@
 """The wiping task for Gymnasium: one environment, or many stepped in native threads."""
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -192,8 +192,8 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
     ):
-        if num_envs < 1:
-            raise InvalidInputError(f"num_envs = {num_envs}; give 1 or more")
+        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+            raise InvalidInputError(f"num_envs = {num_envs!r}; give a whole number from 1 on")
         self.num_envs = int(num_envs)
         self._begin(config, self.num_envs, render_mode, max_episode_steps)
         self.single_observation_space, self.single_action_space = _spaces(self.tasks.config)
@@ -245,7 +245,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
             first = _seed_of(seed)
             seeds = [None if first is None else first + i for i in range(self.num_envs)]
         else:
-            seeds = [_seed_of(one) for one in seed]
+            seeds = [_seed_of(one) for one in (seed if isinstance(seed, Iterable) else [seed])]
         if len(seeds) != self.num_envs:
             raise InvalidInputError(f"{len(seeds)} seeds for {self.num_envs} environments; give one each")
         rngs = [seeding.np_random(one)[0] for one in seeds]
