@@ -287,7 +287,7 @@ def _learn_pace(c):
         mean, change = 0.5 * dt * (state.qd_good[i] + m.qd[i]), 0.5 * dt * (m.qd[i] - state.qd_good[i])
         way += (m.q[i] - state.q_good[i]) * mean
         squares += mean * mean
-        unknown += change * change
+        unknown += max(change * change - mean * mean, 0.0)
     if squares < _STANDS_RAD2:
         return
     variance, news = unknown / squares, way / squares - state.pace
