@@ -274,9 +274,7 @@ class Controller(Independent):
         if (np.abs(qd) <= most).all():
             return qd
         i = int(np.argmax(np.abs(qd) > most))
-        raise InvalidInputError(
-            f"qd[{i}] = {qd[i]:.4g} rad/s is faster than this arm gets, {most[i]:.4g}; give rad/s"
-        )
+        raise InvalidInputError(f"qd[{i}] = {qd[i]:.4g} rad/s is faster than this arm gets, {most[i]:.4g}; give rad/s")
 
     def _in_range(self, q: np.ndarray, name: str) -> np.ndarray:
         past = self._past_limits(q)
