@@ -7,7 +7,15 @@ import numpy as np
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.load import payload_weight_into, take_up
 from contactsafe.control.presets import safe
-from contactsafe.control.records import CONTACT, FAULTS, LIMITS, controller_dtype, fill_params, mass_variance
+from contactsafe.control.records import (
+    CONTACT,
+    FAULTS,
+    LIMITS,
+    OUTSIDE_RAD,
+    controller_dtype,
+    fill_params,
+    mass_variance,
+)
 from contactsafe.control.tick import tick_at
 from contactsafe.copying import Independent
 from contactsafe.errors import InvalidInputError
@@ -176,7 +184,7 @@ class Controller(Independent):
             InvalidInputError: a wrong shape, a number that is not finite, joints outside their range, or more torque
                 than the arm's limit.
         """
-        q = self._in_range(self.arm.joint_vector(q, "q"), "q")
+        q = self._in_range(self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
         qd = np.zeros(self.arm.n) if qd is None else self._believable(self.arm.joint_vector(qd, "qd"))
         dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else self._within_limit(torque)
@@ -276,11 +284,11 @@ class Controller(Independent):
         i = int(np.argmax(np.abs(qd) > most))
         raise InvalidInputError(f"qd[{i}] = {qd[i]:.4g} rad/s is faster than this arm gets, {most[i]:.4g}; give rad/s")
 
-    def _in_range(self, q: np.ndarray, name: str) -> np.ndarray:
+    def _in_range(self, q: np.ndarray, name: str, tolerance: float) -> np.ndarray:
         past = self._past_limits(q)
-        if (past <= RANGE_TOLERANCE).all():
+        if (past <= tolerance).all():
             return q
-        i = int(np.argmax(past > RANGE_TOLERANCE))
+        i = int(np.argmax(past > tolerance))
         low, high = self.arm.q_min[i], self.arm.q_max[i]
         remedy = "move the joint back by hand or in the robot's own mode, or correct the arm's range"
         if name != "q":
@@ -290,7 +298,7 @@ class Controller(Independent):
         limit = f"above its limit {high:.4f}" if q[i] > high else f"below its limit {low:.4f}"
         raise InvalidInputError(
             f"{name}[{i}] = {q[i]:.4f} rad, joint '{self.arm.model.joint(i).name}', is {past[i]:.4f} rad {limit}; "
-            f"{RANGE_TOLERANCE} is tolerated: {remedy}"
+            f"{tolerance} is tolerated: {remedy}"
         )
 
     def _past_limits(self, q: np.ndarray) -> np.ndarray:
@@ -357,7 +365,7 @@ class Controller(Independent):
         if target.posture is None:
             posture = self._ik.posture_near(Pose(position, quat), record["q_pose"].copy())
         else:
-            posture = self._in_range(self.arm.joint_vector(target.posture, "posture"), "posture")
+            posture = self._in_range(self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
         record["position"], record["quat"], record["q_pose"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers

@@ -25,7 +25,7 @@ UNKNOWN_SPEED_LIMIT = 4.0 * math.pi
 FREE, CONTACT = 0, 1
 """Modes of the supervisor."""
 
-_OUTSIDE_RAD = 0.5
+OUTSIDE_RAD = 0.5
 """A joint measured further outside its range than this is not there: no stop gives way so far."""
 
 _TURNS_RAD = 1e4
@@ -386,8 +386,8 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     # From full drive to full braking of all that may drive a joint, and the lag of what is measured.
     params["reversal_s"] = 2.0 * arm.tau_max.max() / arm.torque_rate_max + 10.0 * config.loop_delay_s
     params["tau_max"], params["friction"] = arm.tau_max, arm.friction
-    params["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - _OUTSIDE_RAD
-    params["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + _OUTSIDE_RAD
+    params["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - OUTSIDE_RAD
+    params["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + OUTSIDE_RAD
     params["qd_most"] = np.minimum(_FASTER * arm.qd_max, _speed_gained(arm))
 
 
