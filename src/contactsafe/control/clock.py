@@ -47,6 +47,9 @@ _SAME_PACE = 0.4
 _PACE_RAD2, _PACE_UNKNOWN, _PACE_KNOWN, _STANDS_RAD2 = 5e-5**2, 0.25, 0.02**2, 1e-14
 """Variance of positions; of the pace, in ticks a call, at first and at the best; joints that do not move in a tick."""
 
+_SHAKES = 0.25
+"""A joint whose velocity changes by more than this share of itself in half a tick does not tell how long that was."""
+
 _BRAKE = 10.0
 """Corner of the brake, critically damped, 1/s: speed is gone within some 0.2 s."""
 
@@ -287,7 +290,7 @@ def _learn_pace(c):
         mean, change = 0.5 * dt * (state.qd_good[i] + m.qd[i]), 0.5 * dt * (m.qd[i] - state.qd_good[i])
         way += (m.q[i] - state.q_good[i]) * mean
         squares += mean * mean
-        unknown += max(change * change - mean * mean, 0.0)
+        unknown += max(change * change - (_SHAKES * mean) ** 2, 0.0)
     if squares < _STANDS_RAD2:
         return
     variance, news = unknown / squares, way / squares - state.pace
