@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t, shorten, spd_inverse
+from contactsafe.robot.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t_into, shorten, spd_inverse
 from contactsafe.robot.rotation import orientation_error
 from contactsafe.robot.stack import stack_matrix, stack_vector
 
@@ -133,13 +133,15 @@ def contact_nullspace(N_t, M_inv, residual):
     Returns:
         Projector, (n, n).
     """
-    a = matvec_t(N_t, residual)
-    M_inv_a = matvec(M_inv, a)
+    n = N_t.shape[0]
+    a = matvec_t_into(N_t, residual, stack_vector(n))
+    M_inv_a = matvec_into(M_inv, a, stack_vector(n))
     a_M_inv_a = dot(a, M_inv_a)
     N_ct = N_t.copy()
-    if a_M_inv_a <= 1e-6 * dot(residual, matvec(M_inv, residual)):
+    whole = dot(residual, matvec_into(M_inv, residual, stack_vector(n)))
+    if a_M_inv_a <= 1e-6 * whole:
         return N_ct
-    N_t_a_sharp = matvec(N_t, M_inv_a)
+    N_t_a_sharp = matvec_into(N_t, M_inv_a, stack_vector(n))
     for i in range(a.shape[0]):
         for j in range(a.shape[0]):
             N_ct[i, j] -= N_t_a_sharp[i] * a[j] / a_M_inv_a

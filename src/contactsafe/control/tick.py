@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from contactsafe.compiled import compiled
 from contactsafe.control.braking import brake_into, braking_share
 from contactsafe.control.clock import (
@@ -70,7 +68,7 @@ from contactsafe.control.records import (
 from contactsafe.control.supervisor import supervise
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.robot.linalg import dot, matmul, matvec_t, shorten
+from contactsafe.robot.linalg import dot, matmul, matvec_t_into, shorten
 from contactsafe.robot.stack import stack_vector
 
 _WHOLE = 0.99
@@ -203,6 +201,7 @@ def _law(c, Lambda, J_bar):
     peace, scales the one and never the other.
     """
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
+    n = state.q.shape[0]
     passive_step(
         state.K_task,
         state.D_task,
@@ -220,10 +219,12 @@ def _law(c, Lambda, J_bar):
     _limit_damping(c, D_task.max())
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    tau_spring, tau_damping = _posture(c)
-    pull = matvec_t(dynamics.J, F_spring) + matvec_t(N_ct, tau_spring)
-    damping = matvec_t(dynamics.J, F_damping) + matvec_t(N_ct, tau_damping)
-    observer_step(state.tool_force, state.step.probe_share, _tool_force(c, J_bar))
+    tau_spring, tau_damping = stack_vector(n), stack_vector(n)
+    _posture_into(c, tau_spring, tau_damping)
+    of_task, of_posture = stack_vector(n), stack_vector(n)
+    pull = matvec_t_into(dynamics.J, F_spring, of_task) + matvec_t_into(N_ct, tau_spring, of_posture)
+    damping = matvec_t_into(dynamics.J, F_damping, of_task) + matvec_t_into(N_ct, tau_damping, of_posture)
+    observer_step(state.tool_force, state.step.probe_share, _tool_force_into(c, J_bar, stack_vector(6)))
     share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
     reason = LIMITED_BY_TOOL_FORCE if share < 1.0 else 0
     if state.mode == FREE:
@@ -231,7 +232,8 @@ def _law(c, Lambda, J_bar):
         _follow_share(state, params, share, reason)
         tau = state.task_share * pull + damping + state.unweighed
     else:
-        disturbance = matvec_t(dynamics.J, matvec_t(J_bar, state.arm_torque))
+        F_arm = matvec_t_into(J_bar, state.arm_torque, stack_vector(6))
+        disturbance = matvec_t_into(dynamics.J, F_arm, of_task)
         tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, reason)
     return tau + dynamics.c + dynamics.g
 
@@ -254,26 +256,27 @@ def _limit_damping(c, D_task):
 
 
 @compiled
-def _posture(c):
-    """Give what pulls to the posture and what damps it, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m."""
+def _posture_into(c, tau_spring, tau_damping):
+    """Fill what pulls to the posture and what damps it, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m."""
     state, params = c.state, c.params
     _follow_posture(state, params)
-    tau_spring = state.target.q_pose - state.q
+    for i in range(tau_spring.shape[0]):
+        tau_spring[i] = state.target.q_pose[i] - state.q[i]
     shorten(tau_spring, params.posture_error_max_rad)
-    tau_damping = np.empty(tau_spring.shape[0])
     for i in range(tau_spring.shape[0]):
         D = state.damping_share[i] * params.D_pose[i]
         tau_spring[i] *= state.posture_share * min(params.K_pose[i], D / (2.0 * params.loop_delay_s))
         tau_damping[i] = -D * state.qd[i]
-    return tau_spring, tau_damping
 
 
 @compiled
-def _tool_force(c, J_bar):
+def _tool_force_into(c, J_bar, wrench):
     """Force of the environment on the tool, (3,), N: measured, or without a sensor what the residual says, J#ᵀ r."""
     if c.state.has_wrench != 0:
-        return c.state.wrench_ee[:3]
-    return matvec_t(J_bar, c.state.residual_trigger)[:3]
+        wrench[:] = c.state.wrench_ee
+    else:
+        matvec_t_into(J_bar, c.state.residual_trigger, wrench)
+    return wrench[:3]
 
 
 @compiled
@@ -308,8 +311,14 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
     state, params = c.state, c.params
     qd, direction, M_inv = c.state.qd, c.state.direction, c.dynamics.M_inv
     limit = _push_limit(c)
-    damping -= params.null_damping * matvec_t(removed, state.damping_share * qd)
-    damping -= params.contact_damping * state.damping_share * qd
+    n = qd.shape[0]
+    shared, in_null = stack_vector(n), stack_vector(n)
+    for i in range(n):
+        shared[i] = state.damping_share[i] * qd[i]
+    matvec_t_into(removed, shared, in_null)
+    for i in range(n):
+        damping[i] -= params.null_damping * in_null[i]
+        damping[i] -= params.contact_damping * state.damping_share[i] * qd[i]
     compensation = -task_disturbance
     push = push_along(direction, M_inv, compensation)
     if push > limit:
