@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contactsafe.core.errors import ContactSafeError
 from contactsafe.envs.tasks import OBSERVED
-from contactsafe.errors import ContactSafeError
 from contactsafe.learning import graph
 from contactsafe.learning.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
 from contactsafe.learning.operators import RULES

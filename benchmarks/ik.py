@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot import robots
 from contactsafe.robot.ik import solve_ik, trac_ik
-from contactsafe.robot.rotation import quat_to_matrix
 
 POSES = 500
 REPEATS = 5

@@ -12,11 +12,11 @@ import time
 import numpy as np
 
 from contactsafe import Controller, Measurement, Pose, Target
-from contactsafe.errors import UnreachableError
+from contactsafe.core.errors import UnreachableError
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.robot import robots
 from contactsafe.robot.ik import POSITION_TOLERANCE, ROTATION_TOLERANCE, InverseKinematics
 from contactsafe.robot.posture import find_posture, posture_rule
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 CALLS, PAIRS = 5000, 100_000

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import contactsafe as cs
-from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick
+from contactsafe.core.compiled import compiled
 
 REPEATS = 9
 AFTER = 800  # ticks in contact

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 from contactsafe.envs.config import WipingConfig
 from contactsafe.learning.algorithms import PpoConfig
 from contactsafe.learning.observation import ObservationScaling

@@ -14,6 +14,7 @@ import pytest
 import contactsafe
 from contactsafe.cli import COMMANDS, main
 from contactsafe.control import presets
+from contactsafe.core.parse import parse
 from contactsafe.envs import ENGINES
 from contactsafe.envs.config import Sight
 from contactsafe.experiments.config import PLANTS
@@ -21,7 +22,6 @@ from contactsafe.experiments.registry import ENTRIES
 from contactsafe.learning.bundle import shipped_bundle
 from contactsafe.learning.evaluation import FIGURES
 from contactsafe.learning.references import REFERENCES
-from contactsafe.parse import parse
 from contactsafe.sim.drawings import BOARDS
 
 UNKNOWN = "--{}: 'best' is unknown; choose from vices, paper, safe; see contactsafe {} --help"

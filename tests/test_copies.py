@@ -20,13 +20,13 @@ import pytest
 
 import contactsafe as cs
 from contactsafe.control.records import controller_dtype
-from contactsafe.copying import OfTraining, Threads, Unique
+from contactsafe.core.copying import OfTraining, Threads, Unique
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.pushes import Pushes
 from contactsafe.envs.sampling import MaskSampler
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.envs.wiping import WipingEnv
-from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import draw_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from contactsafe.compiled import CACHE_FOLDER
+from contactsafe.core.compiled import CACHE_FOLDER
 from tests.sandbox import opened_a_socket, run_without_sockets
 
 ROOT = Path(__file__).parents[1]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from contactsafe.cli import main
-from contactsafe.compiled import ANNOUNCEMENT
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.compiled import ANNOUNCEMENT
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.warmup import steps
 
 SIX = Path(__file__).parents[1] / "examples" / "own_scene.xml"
@@ -79,7 +79,7 @@ def test_the_first_step_in_a_process_has_nothing_left_to_compile_or_load(arm, mo
 
 TWICE = """
 import numpy as np
-from contactsafe.robot.rotation import quat_multiply
+from contactsafe.core.rotation import quat_multiply
 for kind in (np.float64, np.float32):
     quat_multiply(np.ones(4, kind), np.ones(4, kind))
 """
@@ -109,7 +109,7 @@ def test_warming_up_says_where_it_lies(capsys):
     """In the folder that the other tests have filled: each part runs."""
     assert main(["warmup", "--joints", "7"]) == 0
     said = capsys.readouterr()
-    from contactsafe.compiled import CACHE_FOLDER
+    from contactsafe.core.compiled import CACHE_FOLDER
 
     assert CACHE_FOLDER in said.out
     assert said.out.count("\n") == 1

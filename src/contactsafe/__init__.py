@@ -1,12 +1,14 @@
 """Contact-safe learned manipulation: a policy moves a torque-controlled arm, and every contact stays gentle."""
 
-from contactsafe import process as _process  # noqa: F401  first, for the imports below take their time; see there
-from contactsafe import telemetry as _telemetry  # noqa: F401  before any dependency is imported
+from contactsafe.core import process as _process  # noqa: F401  first, for the imports below take their time; see there
+from contactsafe.core import telemetry as _telemetry  # noqa: F401  before any dependency is imported
+
+# isort: split
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
+from contactsafe.core.errors import ContactSafeError
 from contactsafe.envs import register as _register
-from contactsafe.errors import ContactSafeError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.payload import Payload

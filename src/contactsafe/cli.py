@@ -14,18 +14,18 @@ import tyro
 from tqdm import tqdm
 
 import contactsafe
-from contactsafe import process
-from contactsafe.compiled import CACHE_FOLDER
 from contactsafe.control import presets
+from contactsafe.core import process
+from contactsafe.core.compiled import CACHE_FOLDER
+from contactsafe.core.errors import ContactSafeError, InvalidInputError
+from contactsafe.core.parse import call, docstring, one_of, parse, some_of
 from contactsafe.envs import ENGINES
 from contactsafe.envs.config import Sight, WipingConfig
-from contactsafe.errors import ContactSafeError, InvalidInputError
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.learning.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
 from contactsafe.learning.references import REFERENCES
-from contactsafe.parse import call, docstring, one_of, parse, some_of
 from contactsafe.sim.drawings import Boards
 
 _COMPILES = "the first run compiles for a minute or two"
@@ -384,7 +384,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Args:
         arguments: words after `contactsafe`. Where None, this process is the program: the words are its own, and so are
-            streams and signals, see `contactsafe.process.run`.
+            streams and signals, see `contactsafe.core.process.run`.
 
     Returns:
         The exit status: 0, 1 where the command said in one line what is wrong, 2 where the words make no sense.

@@ -9,11 +9,11 @@ import gymnasium
 import numpy as np
 
 from contactsafe.control.controller import Controller
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs import ENGINES
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.rectify import rectify
 from contactsafe.envs.sampling import MaskSampler
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.bundle import shipped_bundle
 from contactsafe.learning.policy import Policy
 from contactsafe.robot.arm import Arm, arm_from_facts

@@ -14,7 +14,7 @@ from contactsafe import Measurement, presets
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import FAULTS
 from contactsafe.control.tick import tick_at
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 CONFIG = replace(presets.safe(), friction_compensation=False)
 NAN = np.full(7, np.nan)

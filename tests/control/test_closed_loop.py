@@ -9,7 +9,7 @@ from tests.control.plant import STIFFNESS, UNTOUCHED, Plant, controller_at, hold
 
 from contactsafe import Pose, Target, presets
 from contactsafe.control.laws import task_error
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 
 FREE = replace(presets.vices(), friction_compensation=False)
 

@@ -14,7 +14,7 @@ import numba
 import pytest
 from numba.core import caching
 
-from contactsafe import compiled
+from contactsafe.core import compiled
 
 
 @pytest.fixture
@@ -197,7 +197,7 @@ def test_a_home_that_cannot_be_written_is_said_once_and_nothing_left(tmp_path):
     (tmp_path / "file").write_text("")
     code = """
 import os, subprocess, sys
-from contactsafe.compiled import CACHE_FOLDER
+from contactsafe.core.compiled import CACHE_FOLDER
 print(CACHE_FOLDER)
 if len(sys.argv) == 1:
     if os.fork() == 0:
@@ -321,7 +321,7 @@ def test_a_cache_that_can_only_be_read_is_read(tmp_path, monkeypatch, private, c
 def test_many_processes_that_start_at_once_share_one_cache(tmp_path):
     code = """
 import sys
-from contactsafe import compiled
+from contactsafe.core import compiled
 sys.path.insert(0, sys.argv[1])
 import small  # by name: what one process kept, another finds its module by
 function = compiled.compiled(small.double)

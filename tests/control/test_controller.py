@@ -7,7 +7,7 @@ from tests.control.plant import STIFFNESS, Plant, controller_at, hold, reach
 
 from contactsafe import Controller, Measurement, Pose, Target, presets
 from contactsafe.control.records import controller_dtype
-from contactsafe.errors import InvalidInputError, UnreachableError
+from contactsafe.core.errors import InvalidInputError, UnreachableError
 
 
 @pytest.fixture(scope="module")

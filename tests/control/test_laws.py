@@ -17,8 +17,8 @@ from contactsafe.control.laws import (
     task_nullspace,
     tool_share,
 )
-from contactsafe.robot.linalg import shorten
-from contactsafe.robot.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
+from contactsafe.core.linalg import shorten
+from contactsafe.core.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
 
 FLOOR, DAMPING = 1e-2, 0.05
 seeds = st.integers(0, 2**32 - 1)

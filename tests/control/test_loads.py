@@ -10,7 +10,7 @@ import pytest
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
 
 from contactsafe import Controller, Measurement, Pose, presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.payload import Payload, carrying
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 from tests.control.plant import controller_at, hold, reach
 
 from contactsafe import Measurement, Pose, presets
-from contactsafe.errors import UnreachableError
+from contactsafe.core.errors import UnreachableError
 
 
 def test_twenty_laps_without_a_posture_bring_the_elbow_back(panda):

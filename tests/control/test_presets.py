@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import pytest
 
 from contactsafe import ControllerConfig, presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 
 def test_paper_has_every_printed_parameter_and_nothing_beyond_it():

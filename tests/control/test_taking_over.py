@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
 
 from contactsafe import Controller, Measurement, presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 LEAST = 1e-9
 

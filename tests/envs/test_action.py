@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.envs.action import ACTION_NAMES, DOWN, rotation_from_down
 from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 
 CONFIG = ActionConfig()
 STEP = np.array([*CONFIG.translation, *CONFIG.rotation, *CONFIG.stiffness, *CONFIG.damping])

@@ -6,9 +6,9 @@ import pytest
 from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_allclose, assert_array_equal
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs import ENGINES, make_engine
 from contactsafe.envs.config import WipingConfig
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.bundle import shipped_bundle
 from contactsafe.learning.evaluation import evaluate_policy
 from contactsafe.learning.policy import Policy

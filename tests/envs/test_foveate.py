@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from tests.learning.fakes import BOARD, camera_homography
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.foveate import FEATURES, RINGS, SCALES_M, SECTORS, foveate, ground_of
-from contactsafe.errors import InvalidInputError
 from contactsafe.sim.camera import plane_homography
 from contactsafe.sim.config import Camera
 

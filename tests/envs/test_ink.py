@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.bullet import BulletTasks
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import InvalidInputError
 from contactsafe.sim.camera import camera_at, render_mask
 from contactsafe.sim.config import BoardConfig, Camera, WorldConfig
 from contactsafe.sim.ink import nearest_ink

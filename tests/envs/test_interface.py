@@ -10,10 +10,10 @@ from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.step import REWARD_TERMS
 from contactsafe.envs.wiping import WipingEnv, WipingVectorEnv
-from contactsafe.errors import InvalidInputError
 
 NAME = "contactsafe/Wiping-v0"
 SHORT = WipingConfig(episode_s=0.1)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.pushes import Pushes
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import InvalidInputError
 
 PUSHES = Pushes(force_n=(20.0, 25.0), lasting_s=(0.2, 0.4), pause_s=(0.1, 0.2), links=(4, 5))
 

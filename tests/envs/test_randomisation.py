@@ -6,9 +6,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import contactsafe  # noqa: F401  (registers the task)
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import InvalidInputError
 from contactsafe.sim.randomisation import Randomisation, draw
 
 BROAD = WipingConfig(randomisation=Randomisation.broad(), episode_s=0.5)

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.envs.tasks_by_script import circle_near_ink, episode, idle, press, wipe_nearest
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import RewardConfig, WipingConfig
 from contactsafe.envs.step import REWARD_TERMS
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.envs.wiping import WipingEnv
-from contactsafe.errors import InvalidInputError
 
 TASK = WipingConfig()
 REWARD = TASK.reward

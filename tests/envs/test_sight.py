@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import InvalidInputError
 
 NAME = "contactsafe/Wiping-v0"
 PHOTOGRAPHED = WipingConfig(boards="handwriting", sight="photograph", episode_s=0.1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactsafe import presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import LINKS, draw_motion
 from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
 from contactsafe.experiments.config import ExperimentConfig

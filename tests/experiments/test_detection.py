@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from contactsafe import presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import detection as subject
 from contactsafe.experiments.collision_scenes import draw_motion
 from contactsafe.experiments.config import ExperimentConfig

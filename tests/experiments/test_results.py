@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import BATCH, ExperimentConfig
 from contactsafe.experiments.results import Experiment, Table, Trial, spread, to_json
 

@@ -6,7 +6,7 @@ import signal
 import sys
 from pathlib import Path
 
-from contactsafe import files
+from contactsafe.core import files
 from contactsafe.learning.checkpoints import CHECKPOINT
 from contactsafe.learning.train_policy import train_policy
 

@@ -15,8 +15,8 @@ from stable_baselines3 import TD3  # noqa: E402
 from stable_baselines3.common.noise import NormalActionNoise  # noqa: E402
 from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
+from contactsafe.core.errors import InvalidInputError  # noqa: E402
 from contactsafe.envs.tasks import OBSERVED  # noqa: E402
-from contactsafe.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import ALGORITHMS, PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.observation import ObservationScaling  # noqa: E402

@@ -14,9 +14,9 @@ onnx = pytest.importorskip("onnx")
 from benchmarks import fuzz  # noqa: E402
 from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 
+from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
 from contactsafe.envs.foveate import FEATURES  # noqa: E402
 from contactsafe.envs.tasks import OBSERVED  # noqa: E402
-from contactsafe.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.bundle import Bundle, digest  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402

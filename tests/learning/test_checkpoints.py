@@ -20,8 +20,8 @@ pytest.importorskip("stable_baselines3")
 from benchmarks import fuzz  # noqa: E402
 from tests.learning.fakes import FakeWiping, camera_homography, sample_masks  # noqa: E402
 
-from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
-from contactsafe.files import held  # noqa: E402
+from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
+from contactsafe.core.files import held  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import (  # noqa: E402
     CHECKPOINT,
@@ -341,7 +341,7 @@ def test_the_second_training_in_a_folder_is_refused_and_told_who_the_first_is(ru
 TRAIN_ON_A_FULL_DISK = """
 import pickle, resource, sys
 from pathlib import Path
-from contactsafe.errors import ContactSafeError
+from contactsafe.core.errors import ContactSafeError
 from contactsafe.learning.train_policy import train_policy
 from tests.learning.fakes import FakeWiping
 config = pickle.loads(Path(sys.argv[1]).read_bytes())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.learning.fakes import FakeWiping
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.evaluation import evaluate_policy, step_values
 
 

@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 
 from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
-from contactsafe.errors import InvalidInputError  # noqa: E402
+from contactsafe.core.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
 from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.learning.fakes import BOARD, Board, camera_homography, pixel_grid
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.rectify import rectify
-from contactsafe.errors import InvalidInputError
 
 H = camera_homography()
 BLANK = np.full((128, 128), 255, np.uint8)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import contactsafe  # noqa: F401  (registers the task)
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import evaluate_policy
 from contactsafe.learning.references import DESCENT_M_S, Raster, reference
 

@@ -22,9 +22,9 @@ from tests.learning.fakes import FakeWiping  # noqa: E402
 
 import contactsafe  # noqa: E402, F401 -- registers the task
 from contactsafe.cli import main  # noqa: E402
-from contactsafe.copying import Threads  # noqa: E402
+from contactsafe.core.copying import Threads  # noqa: E402
+from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.envs.config import WipingConfig  # noqa: E402
-from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, save_checkpoint, unpack  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402

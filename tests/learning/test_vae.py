@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 
 from tests.learning.fakes import BOARD, camera_homography, sample_masks  # noqa: E402
 
-from contactsafe.errors import InvalidInputError, OutputError  # noqa: E402
+from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
 from contactsafe.learning.datasets import make_dataset  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder, vae_loss  # noqa: E402

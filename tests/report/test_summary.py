@@ -7,7 +7,7 @@ import stat
 import pytest
 
 import contactsafe
-from contactsafe.errors import OutputError
+from contactsafe.core.errors import OutputError
 from contactsafe.experiments.results import Experiment, Table, Trial
 from contactsafe.report import prepare_output, terminal_table, write_report, write_summary
 from contactsafe.report.output import write_whole

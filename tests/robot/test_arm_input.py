@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from contactsafe.errors import ContactSafeError, InvalidInputError
+from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.robot.arm import finite_array
 
 

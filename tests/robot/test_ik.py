@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.ik import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve_ik, trac_ik
-from contactsafe.robot.rotation import quat_to_matrix
 
 NEAR = 0.2  # rad a joint, each its own way
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from contactsafe.errors import InvalidInputError, UnreachableError
+from contactsafe.core.errors import InvalidInputError, UnreachableError
 from contactsafe.robot import ik
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics

@@ -11,11 +11,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.robot.worlds import SIX
 
-from contactsafe.errors import UnreachableError
+from contactsafe.core.errors import UnreachableError
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import POSITION_TOLERANCE, ROTATION_TOLERANCE, InverseKinematics
 from contactsafe.robot.posture import find_posture, posture_rule
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.robot.user_mjcf import from_mjcf
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])

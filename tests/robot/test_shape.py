@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.franka import HAND, WIPING_PAD
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA

@@ -9,7 +9,7 @@ import pytest
 from tests.robot.worlds import ELBOW
 
 from contactsafe import Controller, Measurement, Target, presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot import robots
 
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.robot.worlds import BALL_SHOULDER, ELBOW, SIX, cell
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import finite_range
 from contactsafe.robot.ik import InverseKinematics

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.sim.scenes import BOARD_Z, CALM, DOWN, panda, posture
 
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import Camera, WorldConfig
 from contactsafe.sim.whiteboard import CLEAN, INK

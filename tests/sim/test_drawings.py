@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 from scipy import ndimage
 from sklearn.datasets import load_digits
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim import handwriting
 from contactsafe.sim.config import BoardConfig
 from contactsafe.sim.drawings import BOARDS, draw_board

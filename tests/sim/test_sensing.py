@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, aim, contact_wrench, panda, posture, run, worlds_at
 
 from contactsafe.control.tick import tick_at
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, PlantConfig, SensorConfig, WorldConfig
 from contactsafe.sim.records import noise_channels
 from contactsafe.sim.scene import build_plant

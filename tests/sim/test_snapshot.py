@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 from tests.sim.scenes import aim, panda, posture, run
 
 from contactsafe.control import presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import REAL_SENSORS, Obstacle, PlantConfig, WorldConfig
 from contactsafe.sim.world import Worlds
 

@@ -12,7 +12,7 @@ from tests.sim.scenes import BOARD_Z, CALM, DOWN, aim, panda, posture, run, worl
 from contactsafe.control.controller import Controller, Measurement, Target
 from contactsafe.control.presets import by_name
 from contactsafe.control.tick import tick_at
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, SensorConfig, WorldConfig
 from contactsafe.sim.records import trace_dtype

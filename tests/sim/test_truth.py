@@ -19,7 +19,7 @@ from tests.sim.scenes import (
     worlds_at,
 )  # fmt: skip
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.shape import arm_capsules
 from contactsafe.sim.config import NO_NOISE, Obstacle, WorldConfig, bottle, thrust_meter
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, aim, run, worlds_at
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
 from contactsafe.sim.whiteboard import CLEAN, INK, OBJECT, Whiteboard, erase_under_pad
 

@@ -2,10 +2,10 @@
 
 import math
 
-from contactsafe.compiled import compiled
 from contactsafe.control.damping import joint_damping_limits
-from contactsafe.robot.linalg import matvec_into
-from contactsafe.robot.stack import stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import matvec_into
+from contactsafe.core.stack import stack_vector
 
 _HASTE = 0.8
 """Share of what is too fast from which the brake takes over, gradually."""

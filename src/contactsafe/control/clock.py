@@ -8,12 +8,12 @@ then the joints tell the time. `docs/concepts/clocks.md` derives the bounds.
 
 import math
 
-from contactsafe.compiled import compiled
 from contactsafe.control.laws import task_error
 from contactsafe.control.records import CLOCK, CONTACT, MISSING, OVERDUE, REPEATED, UNTRUE
-from contactsafe.robot.linalg import dot, matvec, matvec_into, matvec_t_into
-from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, rotvec_to_quat
-from contactsafe.robot.stack import stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matvec, matvec_into, matvec_t_into
+from contactsafe.core.rotation import matrix_to_quat, quat_multiply, rotvec_to_quat
+from contactsafe.core.stack import stack_vector
 
 BRIDGE_TICKS = 20
 """Ticks in a row that are bridged at most; after more of them the arm is braked until it is reset."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from contactsafe.control.damping import GAIN_MARGIN, largest_damping
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 _PER_JOINT = ("K_pose", "D_pose")
 _POSITIVE = (

@@ -17,8 +17,8 @@ from contactsafe.control.records import (
     mass_variance,
 )
 from contactsafe.control.tick import tick_at
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.payload import Payload, carrying, checked_payload

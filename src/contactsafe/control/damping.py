@@ -6,9 +6,9 @@ below β m/dt and no further, β depending on the delay alone; `docs/concepts/da
 
 import math
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matmul_into, matvec_into, spd_inverse
-from contactsafe.robot.stack import stack_matrix, stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matmul_into, matvec_into, spd_inverse
+from contactsafe.core.stack import stack_matrix, stack_vector
 
 GAIN_MARGIN = 2.0
 """By how much dampers stay below what would be unstable; for what model and delay are not known to be."""

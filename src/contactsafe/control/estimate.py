@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.clock import BRIDGE_TICKS
 from contactsafe.control.laws import momentum_into, observer_step, passes_elsewhere, weigh
 from contactsafe.control.records import FREE
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matvec_into, matvec_t_into
+from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import mass_regressor
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.robot.linalg import dot, matvec_into, matvec_t_into
-from contactsafe.robot.stack import stack_vector
 
 _SIGMAS = 3.0
 """A contact is what exceeds this many standard deviations of the weight that is not known yet."""

@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t_into, shorten, spd_inverse
-from contactsafe.robot.rotation import orientation_error
-from contactsafe.robot.stack import stack_matrix, stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t_into, shorten, spd_inverse
+from contactsafe.core.rotation import orientation_error
+from contactsafe.core.stack import stack_matrix, stack_vector
 
 
 @compiled

@@ -2,10 +2,10 @@
 
 import math
 
-from contactsafe.compiled import compiled
 from contactsafe.control.damping import joint_damping_limits
-from contactsafe.robot.linalg import dot, matvec_into, spd_inverse
-from contactsafe.robot.stack import stack_matrix, stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matvec_into, spd_inverse
+from contactsafe.core.stack import stack_matrix, stack_vector
 
 _STILL = 1e-12
 """Twice the energy of an arm that stands still, J: no torque gives it any power worth the name."""

@@ -8,14 +8,14 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.estimate import CORRELATED, NOISE_NM, expect_masses
 from contactsafe.control.laws import weigh
 from contactsafe.control.records import FREE, LOAD
 from contactsafe.control.supervisor import enter
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross_into, dot, matvec_into, matvec_t_into
+from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
-from contactsafe.robot.linalg import cross_into, dot, matvec_into, matvec_t_into
-from contactsafe.robot.stack import stack_vector
 
 _MASS_SIGMA_KG, _MOMENT_SIGMA_KG_M = 3.0, 0.15
 """What is expected of a load before it is weighed: standard deviations of its mass, and of mass times centre."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from contactsafe.control.config import ControllerConfig
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 __all__ = ["PRESETS", "by_name", "paper", "safe", "vices"]
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.laws import is_pushed, observer_step
 from contactsafe.control.records import CONTACT, FREE
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot
 from contactsafe.robot.contact import best_point, contact_lever, skin_torque
-from contactsafe.robot.linalg import dot
 
 _POINTS_A_TICK = 20
 """Points of the skin that are searched for the contact in one tick."""

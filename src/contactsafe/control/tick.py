@@ -2,7 +2,6 @@
 
 import math
 
-from contactsafe.compiled import compiled
 from contactsafe.control.braking import brake_into, braking_share
 from contactsafe.control.clock import (
     BRIDGE_TICKS,
@@ -66,10 +65,11 @@ from contactsafe.control.records import (
     RUNAWAY,
 )
 from contactsafe.control.supervisor import supervise
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import dot, matmul, matvec_t_into, shorten
+from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.robot.linalg import dot, matmul, matvec_t_into, shorten
-from contactsafe.robot.stack import stack_vector
 
 _WHOLE = 0.99
 """A share of the task this large leaves nothing out that anyone would notice."""

@@ -4,7 +4,7 @@ from typing import Any, cast
 
 import gymnasium
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 WIPING = "contactsafe/Wiping-v0"
 WIPING_BULLET = "contactsafe/WipingBullet-v0"

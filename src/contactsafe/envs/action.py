@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
+from contactsafe.core.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
 from contactsafe.envs.config import ActionConfig
 from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture
-from contactsafe.robot.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
 from contactsafe.sim.config import BoardConfig
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 from contactsafe.envs.action import apply_action
 from contactsafe.envs.step import judge
 from contactsafe.envs.tasks import WipingTasks

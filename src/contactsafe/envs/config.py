@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.pushes import Pushes
-from contactsafe.errors import InvalidInputError
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import Boards, check_boards
 from contactsafe.sim.randomisation import Randomisation

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.byte_scan import places_unlike
+from contactsafe.core.compiled import compiled
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.rectify import INK_BELOW
-from contactsafe.errors import InvalidInputError
-from contactsafe.sim.words import places_unlike
 
 RINGS = 10
 SECTORS = 16

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.world import TICK_S, Worlds
 
 Range = tuple[float, float]

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.compiled import compiled
+from contactsafe.core.errors import InvalidInputError
 
 INK_BELOW = 128
 """A camera pixel darker than this is ink; masks hold 0 and 255 only."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
 from contactsafe.envs.action import DOWN
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
 from contactsafe.sim.photograph import PHOTO_PX, Photographer
 from contactsafe.sim.world import Worlds
 from contactsafe.vision.segment import Segmenter

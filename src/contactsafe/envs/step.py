@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose, observed_target
 from contactsafe.sim.camera import camera_at, draw_mask
 from contactsafe.sim.ink import nearest_ink, strike_out

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from contactsafe.control import presets
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.action import DOWN, action_limits
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.pushes import Pusher
 from contactsafe.envs.step import REWARD_TERMS, observe, rewards_dtype, step_tasks, task_dtype
-from contactsafe.errors import InvalidInputError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics

@@ -12,10 +12,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, OBSERVED, WipingTasks
-from contactsafe.errors import InvalidInputError
 from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
 from contactsafe.sim.world import POLICY_RATE_HZ
 

@@ -10,13 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.envs.action import DOWN
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.evaluation import HELD_OUT_SEED
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
-from contactsafe.robot.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.robot.shape import arm_capsules, link_frames
 from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import Meeting, Motion, draw_meetings, draw_motion
 from contactsafe.experiments.config import BATCH, PLANTS, ExperimentConfig
 from contactsafe.experiments.motions import record

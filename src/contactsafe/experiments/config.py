@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from contactsafe.control import presets
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 BATCH = 16
 """Most trials stepped together: bounds the memory that their traces take."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import (
     Motion,
     clearance,

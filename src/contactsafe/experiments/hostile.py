@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from contactsafe.control import presets
+from contactsafe.core.rotation import rotvec_to_quat
 from contactsafe.experiments.collision_scenes import draw_plant, draw_thing, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Trial
 from contactsafe.experiments.run import Progress
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.rotation import rotvec_to_quat
 from contactsafe.sim.config import REAL_SENSORS, Obstacle, WorldConfig
 from contactsafe.sim.records import trace_dtype
 from contactsafe.sim.world import MAX_TICKS, Worlds

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.action import DOWN
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy

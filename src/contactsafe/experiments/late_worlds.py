@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.tick import control_tick
+from contactsafe.core.compiled import compiled
+from contactsafe.core.native import mj_step
 from contactsafe.experiments.collision_scenes import Motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.native import mj_step
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.records import trace_dtype
 from contactsafe.sim.stepping import act, begin_report, end_tick, sense

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
 from contactsafe.experiments.collision_scenes import LEAD_M, Motion
 from contactsafe.robot.ik import solve_ik
 from contactsafe.sim.records import trace_dtype

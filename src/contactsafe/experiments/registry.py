@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import clock, collisions, detection, disturbance, hostile, joint_safety, task_safety
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contactsafe.core.errors import BundleError
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.errors import BundleError
 from contactsafe.experiments.results import Recording
 from contactsafe.learning.bundle import Bundle
 from contactsafe.learning.evaluation import HELD_OUT_SEED

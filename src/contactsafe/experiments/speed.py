@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick, tick_at
+from contactsafe.core.compiled import compiled
+from contactsafe.core.native import mj_step
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.learning.policy import Policy
-from contactsafe.robot.native import mj_step
 from contactsafe.sim.camera import draw_mask
 from contactsafe.sim.records import noise_channels
 from contactsafe.sim.stepping import run_ticks

@@ -8,7 +8,7 @@ import torch
 from stable_baselines3 import PPO, SAC
 from torch import nn
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.policy_config import PolicyConfig
 
 

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import BundleError, InvalidInputError, shown
 from contactsafe.envs.foveate import FEATURES
 from contactsafe.envs.tasks import OBSERVED
-from contactsafe.errors import BundleError, InvalidInputError, shown
 from contactsafe.learning.graph import check_ports, read_graph
 from contactsafe.learning.perception import LEARNED, REPRESENTATIONS, encoder_ports, open_session
 from contactsafe.learning.scan import Scan

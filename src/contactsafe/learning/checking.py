@@ -4,7 +4,7 @@ import math
 
 import torch
 
-from contactsafe.errors import InvalidInputError, shown
+from contactsafe.core.errors import InvalidInputError, shown
 
 
 class CheckpointError(InvalidInputError):

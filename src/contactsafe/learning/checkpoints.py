@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from contactsafe.errors import InvalidInputError, OutputError, shown
-from contactsafe.files import held, write_whole
+from contactsafe.core.errors import InvalidInputError, OutputError, shown
+from contactsafe.core.files import held, write_whole
 from contactsafe.learning.checking import CheckpointError, check_tensor, kind_of, part, whole
 
 CHECKPOINT = "checkpoint.pt"

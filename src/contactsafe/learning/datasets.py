@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.rectify import rectify
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.perception import LEARNED
 
 CHUNK = 512

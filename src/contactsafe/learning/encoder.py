@@ -10,7 +10,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 GRID = 8
 """Latent cells along a side of the picture."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 CONTACT_N = 0.5
 """Tool force above which the pad counts as pressed, N: what it takes to erase."""

@@ -14,9 +14,9 @@ import onnx
 import torch
 from torch import nn
 
+from contactsafe.core.errors import BundleError, ContactSafeError, OutputError
+from contactsafe.core.files import cannot_write, write_whole
 from contactsafe.envs.tasks import OBSERVED
-from contactsafe.errors import BundleError, ContactSafeError, OutputError
-from contactsafe.files import cannot_write, write_whole
 from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
 from contactsafe.learning.checkpoints import write_json
 from contactsafe.learning.encoder import MaskEncoder

@@ -16,7 +16,7 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
 
-from contactsafe.errors import BundleError, shown
+from contactsafe.core.errors import BundleError, shown
 from contactsafe.learning.operators import FLOAT, RULES, Call, NotAllowed, Value
 
 OPSETS = (13, 23)

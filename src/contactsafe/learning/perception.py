@@ -3,10 +3,10 @@
 import numpy as np
 import onnxruntime
 
-from contactsafe.copying import Independent, Threads
+from contactsafe.core.copying import Independent, Threads
+from contactsafe.core.errors import BundleError, InvalidInputError
 from contactsafe.envs.foveate import FEATURES, SHARES, foveate, ground_of
 from contactsafe.envs.rectify import rectify
-from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.graph import Graph, read_graph
 
 LEARNED = ("tool", "paper")

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import BundleError, InvalidInputError
 from contactsafe.envs.tasks import OBSERVED
-from contactsafe.errors import BundleError, InvalidInputError
 from contactsafe.learning.bundle import ACTIONS, Bundle, blank_observation
 from contactsafe.learning.perception import Perception
 

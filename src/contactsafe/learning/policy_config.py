@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.parse import one_of, some_of
 from contactsafe.envs import ENGINES
-from contactsafe.errors import InvalidInputError
 from contactsafe.learning.observation import SCALES
-from contactsafe.parse import one_of, some_of
 
 SESSION_FIELDS = (
     "vae",

@@ -14,8 +14,8 @@ from tensorboard.compat.proto import event_pb2, summary_pb2
 from tensorboard.summary.writer.record_writer import RecordWriter
 from tqdm import tqdm
 
-from contactsafe.copying import OfTraining
-from contactsafe.files import cannot_write
+from contactsafe.core.copying import OfTraining
+from contactsafe.core.files import cannot_write
 
 
 class EventFile(OfTraining):

@@ -5,10 +5,10 @@ Each takes the task's observations and gives its actions as a policy does, 60 ti
 
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.foveate import RINGS, SECTORS, foveate, ground_of
-from contactsafe.errors import InvalidInputError
 
 PRESS_N = 5.0
 """Force that the scripts press with, N."""

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contactsafe.copying import OfTraining
-from contactsafe.errors import InvalidInputError
-from contactsafe.files import cannot_write
+from contactsafe.core.copying import OfTraining
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.files import cannot_write
 
 FIELDS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of Stable-Baselines3's ReplayBuffer, one row a step of all environments."""

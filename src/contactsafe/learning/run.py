@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from stable_baselines3.common.save_util import recursive_getattr
 
-from contactsafe.copying import OfTraining
-from contactsafe.errors import InvalidInputError, shown
+from contactsafe.core.copying import OfTraining
+from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, part, whole
 from contactsafe.learning.checkpoints import (
     check_random_state,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 

@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
-from contactsafe.errors import BundleError, InvalidInputError, shown
+from contactsafe.core.errors import BundleError, InvalidInputError, shown
 from contactsafe.learning.bundle import (
     ENCODER,
     FOLDER,

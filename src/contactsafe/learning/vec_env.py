@@ -7,8 +7,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError, shown
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.learning.evaluation import step_values
 from contactsafe.learning.scan import Scan
 from contactsafe.sim.snapshot import Part, check, of_array, of_object, put, take

@@ -4,8 +4,8 @@ import os
 import tempfile
 from pathlib import Path
 
-from contactsafe.errors import OutputError
-from contactsafe.files import replace
+from contactsafe.core.errors import OutputError
+from contactsafe.core.files import replace
 
 _REMEDY = "give a folder you may write to with --out"
 

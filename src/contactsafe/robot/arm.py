@@ -6,13 +6,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.binding import Binding, bind_joints
 from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
-from contactsafe.robot.rotation import matrix_to_quat
 from contactsafe.robot.skin import SKIN_COLUMNS, capsule_skin
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 JOINT, SITE, ACTUATOR = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_ACTUATOR
 _LISTED = 12  # names that a message lists

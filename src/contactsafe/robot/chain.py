@@ -10,9 +10,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
+from contactsafe.core.stack import stack_matrix
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.stack import stack_matrix
 
 
 class Chain(NamedTuple):

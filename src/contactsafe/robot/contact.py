@@ -10,9 +10,9 @@ import math
 
 from numpy import empty, zeros
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import cross_into, dot, matvec, spd_inverse
-from contactsafe.robot.native import view2
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross_into, dot, matvec, spd_inverse
+from contactsafe.core.native import view2
 from contactsafe.robot.skin import SKIN_COLUMNS
 
 _LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m

@@ -9,9 +9,9 @@ import functools
 import mujoco
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.linalg import cross_into, dot, matvec_into, spd_inverse
-from contactsafe.robot.native import (
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross_into, dot, matvec_into, spd_inverse
+from contactsafe.core.native import (
     mj_comPos,
     mj_comVel,
     mj_crb,
@@ -22,7 +22,7 @@ from contactsafe.robot.native import (
     view1,
     view2,
 )
-from contactsafe.robot.stack import stack_vector
+from contactsafe.core.stack import stack_vector
 
 _VIEWED = (
     "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot",

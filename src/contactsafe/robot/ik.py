@@ -5,15 +5,15 @@ from functools import cached_property
 
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError, UnreachableError
-from contactsafe.files import readable
+from contactsafe.core.compiled import compiled
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError, UnreachableError
+from contactsafe.core.files import readable
+from contactsafe.core.linalg import dot, matvec, matvec_t, spd_inverse
+from contactsafe.core.rotation import orientation_error, quat_to_matrix
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
 from contactsafe.robot.dynamics import forward_kinematics
-from contactsafe.robot.linalg import dot, matvec, matvec_t, spd_inverse
 from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture, posture_rule
-from contactsafe.robot.rotation import orientation_error, quat_to_matrix
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 
 try:

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross_into, dot, spd_inverse
+from contactsafe.core.rotation import matrix_to_quat, matrix_to_quat_into
+from contactsafe.core.stack import stack_matrix, stack_vector
 from contactsafe.robot.arm import Arm, Pose, finite_range
 from contactsafe.robot.chain import Chain, chain_kinematics, chain_of
-from contactsafe.robot.linalg import cross_into, dot, spd_inverse
-from contactsafe.robot.rotation import matrix_to_quat, matrix_to_quat_into
-from contactsafe.robot.stack import stack_matrix, stack_vector
 
 POSITION_TOLERANCE = 1e-4
 """A pose counts as reached within this, m."""

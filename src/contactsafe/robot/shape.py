@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.facts import ArmFacts, Tool
-from contactsafe.robot.rotation import quat_to_matrix
 
 
 def link_frames(facts: ArmFacts, q) -> tuple[np.ndarray, np.ndarray]:

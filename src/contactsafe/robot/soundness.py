@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.skin import SKIN_COLUMNS
 
 _MODEL = (

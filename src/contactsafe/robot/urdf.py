@@ -5,9 +5,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Joint, Tool
 from contactsafe.robot.mjcf import numbers
-from contactsafe.robot.rotation import quat_to_matrix
 
 BASE_LINK = "base"
 TIP_LINK = "tcp"

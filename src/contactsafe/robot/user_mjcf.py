@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.arm import Arm, finite_array, finite_range
 from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
 from contactsafe.robot.facts import Inertia
-from contactsafe.robot.rotation import matrix_to_quat
 from contactsafe.robot.skin import geom_skin
 
 _BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY

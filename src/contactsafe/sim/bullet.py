@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from contactsafe.copying import Unique
-from contactsafe.errors import InvalidInputError
-from contactsafe.files import readable
+from contactsafe.core.copying import Unique
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.files import readable
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import numbers

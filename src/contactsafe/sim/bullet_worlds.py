@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.tick import control_tick
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross, matvec_t
+from contactsafe.core.native import mj_comPos, mj_jac, mj_kinematics, view1
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.linalg import cross, matvec_t
-from contactsafe.robot.native import mj_comPos, mj_jac, mj_kinematics, view1
 from contactsafe.sim.bullet import BulletPlant
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.stepping import act, begin_report, end_tick, sense, tool_position, tool_rotation

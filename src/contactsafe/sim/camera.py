@@ -11,10 +11,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.compiled import compiled
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.native import view2
 from contactsafe.robot.mjcf import ARM_CONTYPE
-from contactsafe.robot.native import view2
 from contactsafe.sim.config import Camera
 from contactsafe.sim.ink import count_shown, list_cells
 from contactsafe.sim.whiteboard import Whiteboard

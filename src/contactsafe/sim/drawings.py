@@ -4,7 +4,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.handwriting import FONTS, WORDS, write_digits, write_words
 from contactsafe.sim.whiteboard import Whiteboard
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 FONTS = ("cursive", "scripts", "futural")
 """Of Hershey's fonts, those of one stroke that a person might write on a board."""

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.byte_scan import places_unlike
+from contactsafe.core.compiled import compiled
 from contactsafe.sim.whiteboard import CLEAN, INK
-from contactsafe.sim.words import places_unlike
 
 
 class Ledger(NamedTuple):

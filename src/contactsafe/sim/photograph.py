@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from contactsafe.copying import Independent
+from contactsafe.core.copying import Independent
 from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import BoardConfig, Camera

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.control.laws import observer_gain
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.mjcf import TOOL_SITE
 from contactsafe.sim.config import MAX_OBSTACLES, WorldConfig, per_joint

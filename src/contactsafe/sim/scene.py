@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.facts import ArmFacts, Inertia, Tool
 from contactsafe.robot.mjcf import FLANGE_SITE, arm_body, model_root, numbers

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from contactsafe.errors import InvalidInputError, shown
+from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.sim.records import VIEWED
 
 _READ = (*VIEWED, "cdof", "subtree_com")

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.tick import control_tick
+from contactsafe.core.compiled import compiled
+from contactsafe.core.linalg import cross, cross_into, matvec, matvec_into, matvec_t
+from contactsafe.core.native import mj_jac, mj_step, view1, view2
+from contactsafe.core.stack import stack_vector
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.robot.linalg import cross, cross_into, matvec, matvec_into, matvec_t
-from contactsafe.robot.native import mj_jac, mj_step, view1, view2
-from contactsafe.robot.stack import stack_vector
 from contactsafe.sim.whiteboard import erase_under_pad
 
 _ERASE_EVERY = 8  # ticks: at 0.4 m/s the pad moves 3 mm between, a twentieth of its width

@@ -7,13 +7,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.copying import Independent
+from contactsafe.core.byte_scan import copy_picture, places_unlike
+from contactsafe.core.compiled import compiled
+from contactsafe.core.copying import Independent
 from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
 from contactsafe.sim.config import Camera
 from contactsafe.sim.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
 from contactsafe.sim.snapshot import Part, check, of_array, put, take
-from contactsafe.sim.words import copy_picture, places_unlike
 from contactsafe.sim.world import Worlds
 
 CAMERAS = 16

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.copying import Independent
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.compiled import compiled
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
 
 CLEAN, INK, OBJECT = 0, 1, 2

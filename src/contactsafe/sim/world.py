@@ -7,12 +7,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from contactsafe.compiled import compiled
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype, fill_params, index_bounds
-from contactsafe.copying import Independent, Threads
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.compiled import compiled
+from contactsafe.core.copying import Independent, Threads
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig

@@ -1,6 +1,6 @@
 """From a photograph of the board to its mask, the same in simulation and on a robot. Needs `contactsafe[camera]`."""
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 
 try:
     import cv2 as cv2

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from contactsafe.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.vision.silhouette import fill, on_plane
 
 INK_PIXEL, OTHER_PIXEL = 0, 255

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.stack import stack_matrix, stack_vector
+from contactsafe.core.compiled import compiled
+from contactsafe.core.stack import stack_matrix, stack_vector
 
 
 @compiled
@@ -48,7 +48,7 @@ _COUNT = """
 import numpy as np
 from numba.core.runtime import rtsys
 import contactsafe as cs
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 from contactsafe.control.tick import control_tick
 from contactsafe.robot.dynamics import update_dynamics
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from contactsafe.robot.rotation import (
+from contactsafe.core.rotation import (
     matrix_to_quat,
     orientation_error,
     quat_multiply,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from contactsafe.robot.linalg import cross, cross_into, dot, matmul, matvec, matvec_t, spd_inverse
+from contactsafe.core.linalg import cross, cross_into, dot, matmul, matvec, matvec_t, spd_inverse
 
 
 @pytest.fixture

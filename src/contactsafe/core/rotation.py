@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.compiled import compiled
+from contactsafe.core.compiled import compiled
 
 WORD = 8
 """Pixels in a word."""

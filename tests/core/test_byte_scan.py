@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from contactsafe.sim.words import copy_picture, places_unlike
+from contactsafe.core.byte_scan import copy_picture, places_unlike
 
 
 @pytest.mark.parametrize("size", [1, 7, 8, 81, 4096])

@@ -13,8 +13,8 @@ import mujoco
 from numba import carray, types
 from numba.extending import intrinsic
 
-from contactsafe.compiled import compiled
-from contactsafe.errors import UnsupportedVersionError
+from contactsafe.core.compiled import compiled
+from contactsafe.core.errors import UnsupportedVersionError
 
 SUPPORTED_MUJOCO = (4000000, 4001000)
 """Half-open range of `mujoco.mj_version()` whose native interface the tests have seen."""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from contactsafe.errors import UnsupportedVersionError
-from contactsafe.robot import native
+from contactsafe.core import native
+from contactsafe.core.errors import UnsupportedVersionError
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
 

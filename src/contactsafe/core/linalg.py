@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from contactsafe.compiled import compiled
-from contactsafe.robot.stack import stack_matrix
+from contactsafe.core.compiled import compiled
+from contactsafe.core.stack import stack_matrix
 
 
 @compiled

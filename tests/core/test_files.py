@@ -9,12 +9,12 @@ import time
 
 import pytest
 
-from contactsafe.errors import OutputError, shown
-from contactsafe.files import LOCK, held, readable, write_whole
+from contactsafe.core.errors import OutputError, shown
+from contactsafe.core.files import LOCK, held, readable, write_whole
 
 HOLD = """
 import pathlib, signal, sys
-from contactsafe.files import held
+from contactsafe.core.files import held
 with held(pathlib.Path(sys.argv[1])):
     print("held", flush=True)
     signal.pause()
@@ -44,8 +44,8 @@ def test_a_file_size_limit_leaves_the_old_file_whole(tmp_path):
     write_whole(tmp_path / "file", b"old")
     code = """
 import pathlib, resource, sys
-from contactsafe.errors import OutputError
-from contactsafe.files import readable, write_whole
+from contactsafe.core.errors import OutputError
+from contactsafe.core.files import readable, write_whole
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 for write in (lambda: write_whole(pathlib.Path(sys.argv[1]), bytes(2000)), readable("big", "x" * 2000).__enter__):
     try:
@@ -106,7 +106,7 @@ def test_a_holder_that_was_killed_holds_nothing(tmp_path, holder):
 
 KILLED_WRITING = """
 import os, pathlib, signal, sys
-from contactsafe.files import held, write_whole
+from contactsafe.core.files import held, write_whole
 os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
 with held(pathlib.Path(sys.argv[1])):
     write_whole(pathlib.Path(sys.argv[1]) / "checkpoint.pt", bytes(1000))

@@ -9,7 +9,7 @@ import time
 import pytest
 
 import contactsafe
-from contactsafe.compiled import ANNOUNCEMENT
+from contactsafe.core.compiled import ANNOUNCEMENT
 
 SLOWLY = ["evaluate", "--episodes", "100000"]
 """Works until it is stopped."""
