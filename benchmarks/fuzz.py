@@ -339,7 +339,7 @@ def checkpoints(seed: int, items: range):
                 way = "sealed anew"
                 state = copy.deepcopy(state)
                 state["env"] = unpack(state["env"])
-                _spoil(state, rng)
+                _corrupt(state, rng)
                 if isinstance(state.get("env"), dict):
                     state["env"] = pack(state["env"])
                 save_checkpoint(config.out, state)
@@ -349,7 +349,7 @@ def checkpoints(seed: int, items: range):
                 replay.write_bytes(memory)
 
 
-def _spoil(state, rng):
+def _corrupt(state, rng):
     """Change one leaf of a checkpoint's state, more often one of the worlds'."""
     import torch
 

@@ -106,7 +106,7 @@ def measure_laps(arm):
 
     def by_controller(pose):
         controller.set_target(Target(pose, STIFFNESS))
-        return controller.record["target"]["q_pose"].copy()
+        return controller.record["target"]["q_posture"].copy()
 
     drifts, unreached = {"InverseKinematics": [], "Controller": []}, 0
     for _ in range(PLACES):

@@ -36,15 +36,15 @@ def replay(controllers, q, qd, wrench, torque, modes):
 
 def record(path: Path) -> None:
     """Record a sweep into an obstacle and what follows."""
-    from contactsafe.experiments.collision_scenes import draw_meetings, draw_motion
+    from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
     from contactsafe.experiments.motions import record as run
     from contactsafe.sim.world import Worlds
 
     arm, seed, contact = cs.robots.panda(), 0, False
     while not contact:
-        motion = draw_motion(arm, seed)
+        motion = sample_motion(arm, seed)
         free = _run(arm, motion, (), run, Worlds)
-        met = _run(arm, motion, draw_meetings(arm, motion, free["q"]), run, Worlds)
+        met = _run(arm, motion, sample_meetings(arm, motion, free["q"]), run, Worlds)
         contact = not motion.holds and (met["mode"][-AFTER:] == 1).all()
         seed += 1
     qd = np.gradient(met["q"], 0.001, axis=0)

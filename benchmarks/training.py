@@ -24,8 +24,8 @@ from contactsafe.learning.observation import ObservationScaling
 from contactsafe.learning.perception import Perception
 from contactsafe.learning.scan import Scan
 from contactsafe.learning.vec_env import EncodedVecEnv
-from contactsafe.sim.camera import camera_at, draw_mask
-from contactsafe.sim.ink import nearest_ink, strike_out
+from contactsafe.sim.camera import camera_at, render_mask_into
+from contactsafe.sim.ink import nearest_ink, remove_erased
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
 
@@ -81,25 +81,25 @@ def ticks_alone(worlds, noise, n):
 
 
 @compiled
-def ink_alone(worlds, cameras, ledger, n):
+def ink_alone(worlds, cameras, ink_index, n):
     plants, _, cells, _, _ = worlds
     found = 0
     for i in range(plants.shape[0]):
         camera = camera_at(cameras, plants[i].camera)
         for _ in range(n):
-            strike_out(ledger, i, cells[i], camera.pixels)
+            remove_erased(ink_index, i, cells[i], camera.pixels)
             place = tool_position(plants[i])
-            found += nearest_ink(ledger, i, cells[i], plants[i].origin, plants[i].cell, place)[0]
+            found += nearest_ink(ink_index, i, cells[i], plants[i].origin, plants[i].cell, place)[0]
     return found
 
 
 @compiled
-def masks_alone(worlds, cameras, ledger, masks, n):
+def masks_alone(worlds, cameras, ink_index, masks, n):
     plants = worlds[0]
     for i in range(plants.shape[0]):
         camera = camera_at(cameras, plants[i].camera)
         for _ in range(n):
-            draw_mask(camera, ledger.shown[i], plants[i], masks[i])
+            render_mask_into(camera, ink_index.shown[i], plants[i], masks[i])
 
 
 def processor_time(run, n, worlds):
@@ -143,14 +143,14 @@ def main() -> None:
             print(f"{1e6 * seconds / steps:7.0f} us a step on the wall, {seconds / whole:4.0%}: {name}")
         worlds = tasks.worlds
         records = (worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.no_trace)
-        noise = worlds.draw_noise()
+        noise = worlds.sample_noise()
         alone = {
             "17 ticks of physics and control": lambda n: ticks_alone(records, noise, n),
             "ink counted, nearest found (nothing wiped)": lambda n: ink_alone(
-                records, worlds.cameras, worlds.ledger, n
+                records, worlds.cameras, worlds.ink_index, n
             ),
-            "mask": lambda n: masks_alone(records, worlds.cameras, worlds.ledger, worlds.masks, n),
-            "noise of the sensors": lambda n: [worlds.draw_noise() for _ in range(n)],
+            "mask": lambda n: masks_alone(records, worlds.cameras, worlds.ink_index, worlds.masks, n),
+            "noise of the sensors": lambda n: [worlds.sample_noise() for _ in range(n)],
         }
         for name, run in alone.items():
             run(1)

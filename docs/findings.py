@@ -17,9 +17,9 @@ import numpy as np
 
 import contactsafe as cs
 from contactsafe.control.laws import contact_nullspace, push_along, stiffness_wrench, task_inertia, task_nullspace
-from contactsafe.experiments.collision_scenes import clearance, draw_meetings, draw_motion, facts_and_tool
+from contactsafe.experiments.collision_scenes import clearance, description_and_tool, sample_meetings, sample_motion
 from contactsafe.experiments.collisions import run_battery
-from contactsafe.experiments.detection import CONTACT, alarm_trials, draw_push, draw_strokes, point_torque
+from contactsafe.experiments.detection import CONTACT, alarm_trials, paint_strokes, point_torque, sample_push
 from contactsafe.experiments.disturbance import PUSH_POINTS
 from contactsafe.experiments.hostile import run_hostile
 from contactsafe.experiments.motions import Playback, record
@@ -38,7 +38,7 @@ UNTOUCHED = np.zeros(6)
 
 PAPER, VICES, SAFE = cs.presets.paper(), cs.presets.vices(), cs.presets.safe()
 FAST = replace(
-    PAPER, observer_gain=50.0, trigger_gain=50.0, residual_threshold=2.0, null_damping=3.0, contact_damping=2.0
+    PAPER, observer_gain=50.0, detection_gain=50.0, residual_threshold=2.0, null_damping=3.0, contact_damping=2.0
 )
 """The paper's law with a fast observer and damping where (21) leaves none; nothing bounds its push."""
 
@@ -71,7 +71,7 @@ def postures(count: int) -> list[np.ndarray]:
     """Give postures in which random sweeps and holds begin, away from singularities, (n,) rad each."""
     found: list[np.ndarray] = []
     for seed in itertools.count():
-        q = draw_motion(ARM, seed).q_start
+        q = sample_motion(ARM, seed).q_start
         m = model_at(q)
         if np.linalg.det(m.J @ m.M_inv @ m.J.T) > PAPER.manipulability_floor:
             found.append(q)
@@ -168,7 +168,7 @@ class Scenes:
         self.motions = []
         seed = 0
         while len(self.motions) < wanted:
-            motion = draw_motion(ARM, seed)
+            motion = sample_motion(ARM, seed)
             if not (sweeps_only and motion.holds):
                 self.motions.append(motion)
             seed += 1
@@ -177,7 +177,7 @@ class Scenes:
         self.free = record(worlds, self.motions)
         worlds.close()
         self.obstacles = [
-            tuple(meeting.obstacle for meeting in draw_meetings(ARM, motion, trace["q"]))
+            tuple(meeting.obstacle for meeting in sample_meetings(ARM, motion, trace["q"]))
             for motion, trace in zip(self.motions, self.free, strict=True)
         ]
 
@@ -247,7 +247,7 @@ def projector_is_zero() -> None:
         rank.append(np.linalg.matrix_rank(m.N_t, tol=1e-6))
     say(f"100 postures and contacts: rank of N_t at most {max(rank)}, |N_ct| / |N_t| at most {max(left):.0e}")
     pushes = [push for push in lasting_pushes() if push[0] == 5]
-    quick = replace(PAPER, observer_gain=50.0, trigger_gain=50.0)
+    quick = replace(PAPER, observer_gain=50.0, detection_gain=50.0)
     for name, config in {
         "vices": VICES,
         "paper, K_I 50 1/s": quick,
@@ -261,10 +261,10 @@ def projector_is_zero() -> None:
 
 def slow_observer() -> None:
     """K_I = 1.5 1/s finds a contact late; two filters of one observer serve triggering and compensation apart."""
-    for gain in (PAPER.trigger_gain, 15.0, 50.0, SAFE.trigger_gain):
+    for gain in (PAPER.detection_gain, 15.0, 50.0, SAFE.detection_gain):
         found = []
         for step_nm in (3.0, 5.0, 10.0):
-            loop = Loop(replace(VICES, trigger_gain=gain, residual_cutoff_hz=math.inf))
+            loop = Loop(replace(VICES, detection_gain=gain, residual_cutoff_hz=math.inf))
             loop.data.qfrc_applied[0] = step_nm
             ticks = next((k for k in range(1000) if loop.tick().contact.link), math.inf)
             found.append(f"{ticks:.0f}")
@@ -273,14 +273,14 @@ def slow_observer() -> None:
 
 def printed_law_can_hurt() -> None:
     """The compensation cancels the reaction that would have stopped the arm: peaks above those of no law at all."""
-    laws = {"vices": VICES, "paper": PAPER, "paper, K_I 15": replace(PAPER, observer_gain=15.0, trigger_gain=15.0)}
+    laws = {"vices": VICES, "paper": PAPER, "paper, K_I 15": replace(PAPER, observer_gain=15.0, detection_gain=15.0)}
     _battery(laws, 48)
 
 
 def bounded_push() -> None:
     """Bounding what the command pushes along the contact mends that."""
-    bounded = replace(PAPER, push_yield_nm=3.0, push_hold_nm=3.0, null_damping=3.0)
-    quick = replace(FAST, push_yield_nm=3.0, push_hold_nm=3.0)
+    bounded = replace(PAPER, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0, null_damping=3.0)
+    quick = replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0)
     _battery({"vices": VICES, "paper, 3 N m": bounded, "fast, 3 N m": quick, "safe": SAFE}, 48)
 
 
@@ -298,8 +298,12 @@ def _battery(laws: dict[str, cs.ControllerConfig], trials: int) -> None:
 
 def yield_or_hold() -> None:
     """One bound for all contacts either presses obstacles or lets pushers carry the arm away."""
-    free = replace(FAST, push_yield_nm=math.inf, push_hold_nm=math.inf)
-    laws = {"no bound": free, "3 N m always": replace(FAST, push_yield_nm=3.0, push_hold_nm=3.0), "safe": SAFE}
+    free = replace(FAST, contact_torque_limit_comply_nm=math.inf, contact_torque_limit_reject_nm=math.inf)
+    laws = {
+        "no bound": free,
+        "3 N m always": replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
+        "safe": SAFE,
+    }
     battery = run_battery(laws, range(16), ["clean"])
     for name, config in laws.items():
         strays = strays_mm(hold(config, 1.7, lasting_pushes()))
@@ -329,7 +333,7 @@ def tool_and_arm_told_apart() -> None:
     rng = np.random.default_rng(0)
     seen: dict[str, list[float]] = {"tool": [], "arm": []}
     for m in map(model_at, postures(100)):
-        tool, arm = m.J.T @ rng.standard_normal(6), draw_push(ARM, m.q, rng, CONTACT).torque
+        tool, arm = m.J.T @ rng.standard_normal(6), sample_push(ARM, m.q, rng, CONTACT).torque
         for name, torque in (("tool", tool), ("arm", arm)):
             seen[name].append(np.linalg.norm(m.N_t.T @ torque) / np.linalg.norm(torque))
     say(f"share of a joint torque in the null space: wrench at the tool at most {max(seen['tool']):.0e}, "
@@ -361,16 +365,16 @@ def soft_wrist() -> None:
 
 def _arm_mjcf(mass: float = 1.0, armature: float = 1.0) -> str:
     """Write the arm with its links' masses and its rotors' inertia as multiples of the nominal ones."""
-    facts, tool = facts_and_tool(ARM)
+    description, tool = description_and_tool(ARM)
     links = tuple(
         replace(
             link,
             joint=replace(link.joint, armature=armature * link.joint.armature),
             inertia=replace(link.inertia, mass=mass * link.inertia.mass),
         )
-        for link in facts.links
+        for link in description.links
     )
-    return arm_mjcf(replace(facts, links=links), tool)
+    return arm_mjcf(replace(description, links=links), tool)
 
 
 # What this project found ----------------------------------------------------------------------------------------------
@@ -416,7 +420,9 @@ def force_added_drags_the_arm() -> None:
     runs = {
         "no bound": scenes.run(FAST, worlds),
         "3 N m by adding": scenes.run(FAST, worlds, _ForceAdded),
-        "3 N m by yielding": scenes.run(replace(FAST, push_yield_nm=3.0, push_hold_nm=3.0), worlds),
+        "3 N m by yielding": scenes.run(
+            replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0), worlds
+        ),
         "safe": scenes.run(SAFE, worlds),
     }
     for name, traces in runs.items():
@@ -463,14 +469,18 @@ def _verdicts(trace: np.ndarray) -> tuple[bool, bool, bool]:
     """Tell whether a contact was found, whether its work in the next 50 ms says pusher, and the controller in 0.5 s."""
     found = (trace["mode"] == 1) & (np.abs(trace["tau_arm"]).max(axis=1) > 0.3)
     first = int(np.argmax(found))
-    work = np.einsum("ti,ti->t", trace["residual_trigger"][:-1], np.diff(trace["q"], axis=0))
+    work = np.einsum("ti,ti->t", trace["residual_fast"][:-1], np.diff(trace["q"], axis=0))
     pushes = bool(work[first : first + 50].sum() > 0), bool(trace["holding"][first : first + 500][-1])
     return (True, *pushes) if found.any() else (False, False, False)
 
 
 def stiff_pusher_that_stays() -> None:
     """Where the null space does not give way, holding the tool against a stiff thing that stays means pressing hard."""
-    laws = {"vices": VICES, "no bound": FAST, "3 N m always": replace(FAST, push_yield_nm=3.0, push_hold_nm=3.0)}
+    laws = {
+        "vices": VICES,
+        "no bound": FAST,
+        "3 N m always": replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
+    }
     things = {"front": _driven_into_the_forearm((-1.0, 0.0, 0.0)), "side": _driven_into_the_forearm((0.0, 1.0, 0.0))}
     for name, config in {**laws, "safe": SAFE}.items():
         found = []
@@ -485,7 +495,7 @@ def stiff_pusher_that_stays() -> None:
 
 def _driven_into_the_forearm(direction: Sequence[float]) -> Obstacle:
     """Give a sphere of 20 kN/m that comes along a direction, 15 mm into where the forearm is, and stays."""
-    origins, rotations = link_frames(facts_and_tool(ARM)[0], ARM.home[None])
+    origins, rotations = link_frames(description_and_tool(ARM)[0], ARM.home[None])
     place = origins[0, 5] + rotations[0, 5] @ np.array(PUSH_POINTS[5])
     radius, gap, side = 0.04, 0.005, np.array(direction)
     while clearance(ARM, ARM.home[None], place) < radius + gap:
@@ -497,23 +507,23 @@ def _driven_into_the_forearm(direction: Sequence[float]) -> Obstacle:
 def naming_the_link() -> None:
     """The furthest joint over its threshold seldom is the one that moves the touched link."""
     rng = np.random.default_rng(0)
-    skin = ARM.skin
+    surface = ARM.surface
     own, furthest, nearest = [], [], []
     for q in postures(100):
-        origins, rotations = (frame[0] for frame in link_frames(facts_and_tool(ARM)[0], q[None]))
-        unit = np.array([_unit_torque(origins, rotations, row) for row in skin])
+        origins, rotations = (frame[0] for frame in link_frames(description_and_tool(ARM)[0], q[None]))
+        unit = np.array([_unit_torque(origins, rotations, row) for row in surface])
         sizes = np.linalg.norm(unit, axis=1)
         for _ in range(5):
-            push = draw_push(ARM, q, rng, CONTACT)
+            push = sample_push(ARM, q, rng, CONTACT)
             torque = 10.0 * push.torque / np.linalg.norm(push.force)
             own.append(abs(torque[push.link - 1]))
             over = np.flatnonzero(np.abs(push.torque) > PAPER.residual_threshold)
             furthest.append(abs(push.link - (over[-1] + 1 if over.size else 0)))
             fit = unit @ torque / np.maximum(sizes, 1e-9)
-            nearest.append(abs(push.link - skin[int(np.argmax(fit)), 0]))
+            nearest.append(abs(push.link - surface[int(np.argmax(fit)), 0]))
     say(f"500 pushes on links 3-7: 10 N are {np.median(own):.3f} N m at the pushed link's own joint, median "
         f"(over 1.5 N m in {100 * np.mean(np.array(own) > 1.5):.0f} %)")  # fmt: skip
-    for name, off in {"furthest joint above 1.5 N m": furthest, "nearest point of the skin": nearest}.items():
+    for name, off in {"furthest joint above 1.5 N m": furthest, "nearest point of the surface": nearest}.items():
         right, next_to = 100 * np.mean(np.array(off) == 0), 100 * np.mean(np.array(off) <= 1)
         say(f"10 to 60 N, by the {name:28s} the link is right in {right:.0f} %, at most one off in {next_to:.0f} %")
 
@@ -529,7 +539,7 @@ def weight_of_the_links() -> None:
     heavy = replace(ARM, model=mujoco.MjModel.from_xml_string(_arm_mjcf(mass=1.1)))
     off = np.median([np.abs(model_at(q, heavy).g - model_at(q).g) for q in postures(100)], axis=0)
     say(f"links 10 % heavier: {', '.join(f'{nm:.1f}' for nm in off)} N m at joints 1 to 7, median of 100 postures")
-    strokes = draw_strokes(ARM, 0, 6)
+    strokes = paint_strokes(ARM, 0, 6)
     laws = {"paper": PAPER, "safe, not weighing": replace(SAFE, mass_uncertainty=0.0), "safe": SAFE}
     for name, config in laws.items():
         found = [trial.metrics for trial in alarm_trials(ARM, name, config, strokes)]
@@ -569,12 +579,19 @@ def pull_and_energy() -> None:
     """K e of a far target is a force without bound: bound the pull, and the energy that the command may give."""
     m, error = model_at(ARM.home), np.array([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
     pulls = [
-        np.linalg.norm(stiffness_wrench(m.Lambda, error, np.full(6, 1500.0), c.pull_max_m_s2, c.pull_max_rad_s2)[:3])
+        np.linalg.norm(
+            stiffness_wrench(
+                m.Lambda, error, np.full(6, 1500.0), c.task_acceleration_max_m_s2, c.task_acceleration_max_rad_s2
+            )[:3]
+        )
         for c in (PAPER, SAFE)
     ]
     say(f"a target 10 m away, K1 1500 1/s²: pulled with {pulls[0]:.0f} N; bounded {pulls[1]:.0f} N")
     tank = {"tank_j": SAFE.tank_j, "tank_power_w": SAFE.tank_power_w}
-    pull = {name: getattr(SAFE, name) for name in ("pull_max_m_s2", "pull_max_rad_s2", "posture_error_max_rad")}
+    pull = {
+        name: getattr(SAFE, name)
+        for name in ("task_acceleration_max_m_s2", "task_acceleration_max_rad_s2", "posture_error_max_rad")
+    }
     laws = {"paper": PAPER, "+ tank": replace(PAPER, **tank), "+ bounded pull": replace(PAPER, **pull), "safe": SAFE}
     for name, config in laws.items():
         found = run_hostile(ARM, config, range(8), 5000)

@@ -27,7 +27,7 @@ from contactsafe.envs.pushes import Pushes
 from contactsafe.envs.sampling import MaskSampler
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.envs.wiping import WipingEnv
-from contactsafe.experiments.collision_scenes import draw_motion
+from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.run import Run
@@ -61,7 +61,7 @@ def homography():
 
 
 def evaluate_arm(arm):
-    return [arm.dynamics(arm.home, np.ones(arm.n))["M"], arm.tool_pose(arm.home).position, arm.skin]
+    return [arm.dynamics(arm.home, np.ones(arm.n))["M"], arm.tool_pose(arm.home).position, arm.surface]
 
 
 def evaluate_nominal(nominal):
@@ -127,7 +127,7 @@ def play(playback):
 
 
 def draw(board):
-    board.draw_random(np.random.default_rng(board.ink_cells))
+    board.sample_random(np.random.default_rng(board.ink_cells))
     return [board.cells.copy()]
 
 
@@ -177,7 +177,7 @@ def worlds(kind=Worlds):
     made = kind(cs.robots.panda(), n=2, seed=3)
     for i in range(2):
         made.reset(i, made.arm.home)
-        made.boards[i].draw_random(np.random.default_rng(i))
+        made.boards[i].sample_random(np.random.default_rng(i))
         made.enter_ink(i)
     made.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 20.0, 0.0), 0.001, 1.0)
     return made
@@ -208,7 +208,7 @@ def envs():
 
 def playback():
     arm = cs.robots.panda()
-    motions = [draw_motion(arm, 0), draw_motion(arm, 1)]
+    motions = [sample_motion(arm, 0), sample_motion(arm, 1)]
     return Playback(Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1]), motions)
 
 
@@ -222,7 +222,7 @@ def late_worlds():
 
 def late_playback():
     arm = cs.robots.panda()
-    motions = [draw_motion(arm, 0), draw_motion(arm, 1)]
+    motions = [sample_motion(arm, 0), sample_motion(arm, 1)]
     worlds = Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1])
     return LatePlayback(worlds, motions, 200, 2 * [(30, 60)])
 
@@ -282,7 +282,7 @@ ACTORS = {
     "WipingVectorEnv": (begun(envs, step_envs), step_envs),
     "MaskSampler": (MaskSampler, sample),
     "Photographer": (begun(photographer, take), take),
-    "PhotographSight": (begun(photographed, run_tasks), run_tasks),
+    "PhotographSource": (begun(photographed, run_tasks), run_tasks),
     "Segmenter": (lambda: photographed()._sight._segmenter, segment),
     "Playback": (begun(playback, play), play),
     "LateWorlds": (begun(late_worlds, run_worlds), run_worlds),

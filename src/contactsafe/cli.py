@@ -66,8 +66,8 @@ def demo(
     folder = prepare_output(out)
     started = time.monotonic()
     results = _run(registry.PAPER, loaded, config)
-    facts = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, facts)
+    description = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
+    page = write_report(folder, results, description)
     print(terminal_table(results))
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
 
@@ -116,9 +116,9 @@ def experiment(
     folder = prepare_output(out) if out else None
     started = time.monotonic()
     results = _run([name], loaded, config)
-    facts = _facts(f"contactsafe experiment {name}", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, facts) if folder else None
-    print(to_json(summarise(results, facts)) if json else terminal_table(results))
+    description = _facts(f"contactsafe experiment {name}", config, loaded, time.monotonic() - started)
+    page = write_report(folder, results, description) if folder else None
+    print(to_json(summarise(results, description)) if json else terminal_table(results))
     if page:
         print(f"report: {page}", file=sys.stderr)
 
@@ -360,7 +360,7 @@ def _facts(command: str, config: ExperimentConfig, bundle: Bundle | None, second
         words.append(f"--plants {','.join(config.plants)}")
     if config.minutes != ExperimentConfig.minutes:
         words.append(f"--minutes {config.minutes:g}")
-    facts = {
+    description = {
         "command": " ".join(words),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(config.seeds),
@@ -368,8 +368,8 @@ def _facts(command: str, config: ExperimentConfig, bundle: Bundle | None, second
         "seconds": round(seconds, 1),
     }
     if bundle is not None:
-        facts["bundle_sha256"] = digest((Path(bundle.folder) / MANIFEST).read_bytes())
-    return facts
+        description["bundle_sha256"] = digest((Path(bundle.folder) / MANIFEST).read_bytes())
+    return description
 
 
 def _help() -> str:

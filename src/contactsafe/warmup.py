@@ -16,7 +16,7 @@ from contactsafe.envs.rectify import rectify
 from contactsafe.envs.sampling import MaskSampler
 from contactsafe.learning.bundle import shipped_bundle
 from contactsafe.learning.policy import Policy
-from contactsafe.robot.arm import Arm, arm_from_facts
+from contactsafe.robot.arm import Arm, arm_from_description
 from contactsafe.robot.franka import HAND
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import panda
@@ -56,7 +56,7 @@ def _control(n: int) -> None:
 def _arm_of(n: int) -> Arm:
     """Make an arm of n joints out of the Panda's."""
     links, home = (2 * PANDA.links)[:n], (2 * PANDA.home)[:n]
-    return arm_from_facts(replace(PANDA, links=links, home=home), HAND)
+    return arm_from_description(replace(PANDA, links=links, home=home), HAND)
 
 
 def _run_worlds() -> None:

@@ -23,7 +23,7 @@ def quick_panda(panda):
 
 @pytest.fixture(scope="session")
 def six_joint_arm():
-    """An arm of six joints as a user would bring it: MJCF, no facts, nothing of the Panda in it."""
+    """An arm of six joints as a user would bring it: MJCF, no description, nothing of the Panda in it."""
     axes = ["0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1"]
     body = '<site name="tip" pos="0 0 .25"/>'
     for axis in reversed(axes):

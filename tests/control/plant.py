@@ -102,7 +102,7 @@ def with_sphere(arm, centre, stiffness, mass=1.0, radius=0.05):
 
     The arm's own degrees of freedom stay the first.
     """
-    spec = mujoco.MjSpec.from_string(arm_mjcf(arm.facts, arm.tool))
+    spec = mujoco.MjSpec.from_string(arm_mjcf(arm.description, arm.tool))
     spec.option.gravity = arm.model.opt.gravity
     body = spec.worldbody.add_body(name="sphere", pos=centre, gravcomp=1.0)
     for axis in np.eye(3):

@@ -463,11 +463,11 @@ def test_one_late_tick_filters_as_many_ticks_in_time_do(panda):
     for times in (np.arange(16), np.array([0, 15])):
         controller = controller_at(panda, CONFIG)
         controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED, 0.0), hold(panda))
-        for name in ("observed", "observed_trigger", "residual", "residual_trigger"):
+        for name in ("observed", "observed_fast", "residual", "residual_fast"):
             controller.record["state"][name] = 1.0
         for k in times[1:]:
             controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED, 0.001 * k), hold(panda))
-        residuals.append(controller.record["state"]["observed_trigger"].copy())
+        residuals.append(controller.record["state"]["observed_fast"].copy())
     assert_allclose(residuals[0], residuals[1], rtol=0, atol=0.02)
 
 

@@ -33,8 +33,8 @@ def test_every_parameter_has_a_row_with_meaning_and_three_values(tables):
 def test_values_are_the_presets_and_bold_where_they_differ_from_the_paper(tables):
     table = tables.parameters()
     assert re.search(r"\| `contact_aware` \|.*\| \*\*no\*\* \| yes \| yes \|", table)
-    assert re.search(r"\| `push_yield_nm` \|.*\| ∞ \| ∞ \| \*\*2\*\* \|", table)
-    assert re.search(r"\| `K_pose` \|.*\| 40, 40, 40, 40, 30, 20, 10 \| 40, 40", table)
+    assert re.search(r"\| `contact_torque_limit_comply_nm` \|.*\| ∞ \| ∞ \| \*\*2\*\* \|", table)
+    assert re.search(r"\| `K_posture` \|.*\| 40, 40, 40, 40, 30, 20, 10 \| 40, 40", table)
 
 
 def test_every_fault_has_a_row(tables):

@@ -154,7 +154,7 @@ def changeable(panda):
         ("quat", lambda target: target.pose.quat.__setitem__(slice(None), (0.0, 0.0, 1.0, 0.0))),
         ("K_task", lambda target: target.stiffness.__setitem__(2, 90.0)),
         ("D_task", lambda target: target.damping.__imul__(1.1)),
-        ("q_pose", lambda target: target.posture.__iadd__(0.01)),
+        ("q_posture", lambda target: target.posture.__iadd__(0.01)),
     ],
 )
 def test_a_target_that_is_changed_in_place_is_taken(panda, field, change):
@@ -226,7 +226,7 @@ def test_posture_comes_from_inverse_kinematics_where_none_is_given(panda):
     controller = controller_at(panda, presets.safe())
     target = reach(panda, [0.05, 0.1, -0.05])._replace(posture=None)
     controller.set_target(target)
-    posture = controller.record["target"]["q_pose"]
+    posture = controller.record["target"]["q_posture"]
     assert np.linalg.norm(panda.tool_pose(posture).position - target.pose.position) < 1e-4
     assert np.abs(posture - panda.home).max() < 1.0
 
@@ -259,7 +259,7 @@ def test_default_is_safe(panda):
 
 
 def test_nothing_is_made_for_seven_joints_only(six_joint_arm):
-    """Six joints, a user's own model without facts, no null space: it holds, follows, and feels a push."""
+    """Six joints, a user's own model without description, no null space: it holds, follows, and feels a push."""
     arm = six_joint_arm
     plant, controller = Plant(arm), controller_at(arm, presets.safe())
     plant.run(controller, hold(arm), 200)
@@ -275,4 +275,4 @@ def test_nothing_is_made_for_seven_joints_only(six_joint_arm):
     assert out.contact.in_contact
     assert out.contact.link >= 1
     assert np.dot(out.contact.torque, plant.push_torque()) > 0
-    assert controller.record["params"]["K_pose"].tolist() == [40, 40, 40, 40, 30, 20]
+    assert controller.record["params"]["K_posture"].tolist() == [40, 40, 40, 40, 30, 20]

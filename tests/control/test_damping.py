@@ -19,7 +19,7 @@ from contactsafe.control.damping import (
     joint_damping_limits,
     largest_damping,
     loosen_limits,
-    share_damping,
+    scale_damping_into,
     task_damping_into,
 )
 from contactsafe.control.presets import PRESETS, safe
@@ -111,7 +111,7 @@ def test_braking_along_one_direction_takes_what_the_joints_dampers_leave(seed, n
 @given(st.lists(st.floats(0.0, 1e3), min_size=3, max_size=3), st.lists(st.floats(1e-6, 1e3), min_size=3, max_size=3))
 def test_a_share_of_damping_never_passes_its_limit(damping, limits):
     share = np.empty(3)
-    share_damping(np.array(damping), np.array(limits), share)
+    scale_damping_into(np.array(damping), np.array(limits), share)
     assert (share <= 1.0).all()
     assert (share * damping <= np.array(limits) * (1.0 + 1e-12)).all()
     assert_allclose(share[np.array(damping) <= limits], 1.0)
@@ -129,7 +129,7 @@ def test_the_dampers_of_a_panda_are_as_configured(panda):
     """Its joints are heavy enough for all of `safe()`, wherever it stands."""
     config, rng, limits = safe(), np.random.default_rng(2), np.empty(7)
     rate = damping_rate(config, GAIN_MARGIN) - 2.0 * math.sqrt(450.0)
-    wanted = np.maximum(config.D_pose, config.null_damping) + config.contact_damping
+    wanted = np.maximum(config.D_posture, config.null_damping) + config.contact_damping
     for _ in range(300):
         joint_damping_limits(panda.dynamics(rng.uniform(panda.q_min, panda.q_max), np.zeros(7))["M_inv"], rate, limits)
         assert (wanted <= 1.05 * limits).all()

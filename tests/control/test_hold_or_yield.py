@@ -49,7 +49,7 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.holding for contact in contacts)
-    assert 0.9 * SAFE.push_yield_n < np.mean(forces[-300:]) < 1.1 * SAFE.push_yield_n
+    assert 0.9 * SAFE.contact_force_limit_comply_n < np.mean(forces[-300:]) < 1.1 * SAFE.contact_force_limit_comply_n
 
 
 @pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), (20000.0, 0.12)])
@@ -73,8 +73,8 @@ def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness
     assert len(pushes) > 300
     assert (np.array(pushes) <= np.array(limits) + 1e-9).all()
     assert max(pushes) > 0.99 * min(limits)
-    assert max(limits) <= SAFE.push_meet_n * 0.7  # the lever arm is about half a metre
-    assert 0.2 * SAFE.push_yield_n < min(limits) < SAFE.push_yield_nm
+    assert max(limits) <= SAFE.contact_force_limit_initial_n * 0.7  # the lever arm is about half a metre
+    assert 0.2 * SAFE.contact_force_limit_comply_n < min(limits) < SAFE.contact_torque_limit_comply_nm
 
 
 def stopped(controller, q, qd):
@@ -119,7 +119,7 @@ def test_lasting_push_is_held_against(panda, body, force):
 
 
 def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
-    """`hold_margin` times it; tried again after `hold_s`, then twice, four times as long."""
+    """`reject_margin` times it; tried again after `hold_s`, then twice, four times as long."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.push("link5", (0.0, 25.0, 0.0))
     still = hold(panda)
@@ -130,7 +130,7 @@ def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_
             times.append((k, float(state["hold_s"])))
             held.append(float(state["hold_nm"]) / float(state["torque_smooth_nm"]))
     assert [hold_s for _, hold_s in times[:3]] == [SAFE.hold_s, 2 * SAFE.hold_s, 4 * SAFE.hold_s]
-    assert held == pytest.approx([SAFE.hold_margin] * len(held), rel=0.01)
+    assert held == pytest.approx([SAFE.reject_margin] * len(held), rel=0.01)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])

@@ -17,7 +17,7 @@ SAFE = presets.safe()
 
 
 def all_finite(record):
-    return all(np.isfinite(record[name]).all() for name in ("torque", "residual", "residual_trigger", "error"))
+    return all(np.isfinite(record[name]).all() for name in ("torque", "residual", "residual_fast", "error"))
 
 
 def test_thirty_thousand_ticks_of_random_targets_and_pushes(panda):
@@ -67,7 +67,7 @@ def test_any_state_gives_a_finite_torque_within_its_limits(panda, seed):
         assert (np.abs(torque) <= panda.tau_max).all()
         assert np.abs(torque - before).max() <= 1.0
         state = records[0]["state"]
-        assert 0.0 <= state["task_share"] <= 1.0
+        assert 0.0 <= state["task_scale"] <= 1.0
         assert np.isfinite(state["mass_error"]).all()
         assert np.isfinite(state["threshold"]).all()
         before = torque

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
-    passes_elsewhere,
+    line_of_action_misses_tool,
     push_along,
     stiffness_wrench,
     task_error,
@@ -167,7 +167,7 @@ def test_a_touch_of_the_tool_never_passes_elsewhere(seed, distance, force):
     point *= distance / np.linalg.norm(point)
     F *= force / np.linalg.norm(F)
     noise *= 1.99 / np.linalg.norm(noise)
-    assert not passes_elsewhere(np.array([*F, *(np.cross(point, F) + noise)]), 0.08, 2.0)
+    assert not line_of_action_misses_tool(np.array([*F, *(np.cross(point, F) + noise)]), 0.08, 2.0)
 
 
 @given(seeds, st.floats(0.1, 1.0), st.floats(0.0, 100.0))
@@ -178,7 +178,7 @@ def test_a_force_whose_line_passes_far_from_the_tool_is_not_its(seed, distance, 
     F *= (2.0 / (distance - 0.08) + beyond + 0.01) / np.linalg.norm(F)
     point -= F * (F @ point) / (F @ F)
     point *= distance / np.linalg.norm(point)
-    assert passes_elsewhere(np.array([*F, *np.cross(point, F)]), 0.08, 2.0)
+    assert line_of_action_misses_tool(np.array([*F, *np.cross(point, F)]), 0.08, 2.0)
 
 
 @given(seeds, st.integers(1, 8), st.floats(1e-3, 100.0))

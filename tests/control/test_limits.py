@@ -12,11 +12,11 @@ from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 from contactsafe import Measurement, presets
 from contactsafe.control.damping import joint_damping_limits
 from contactsafe.control.limits import (
-    coming_speed,
     joint_excess,
     joint_stop_gains,
     joint_stop_torque,
     limit_torque,
+    predict_velocity,
 )
 
 TAU_MAX = np.array([87.0, 87.0, 12.0])
@@ -98,7 +98,7 @@ def stop(tau, q, qd, in_force=(0.0, 0.0), inertia=M):
     """Give what a command becomes at the joint stops, with another one in force."""
     out, qd, M_inv = np.array(tau, dtype=float), np.array(qd, dtype=float), np.linalg.inv(inertia)
     speed, ahead, excess, intrusion = np.empty((4, 2))
-    coming_speed(qd, M_inv, np.array(in_force), 1.0, 0.001, speed, ahead)
+    predict_velocity(qd, M_inv, np.array(in_force), 1.0, 0.001, speed, ahead)
     some = joint_excess(np.array(q), qd, speed, ahead, Q_MIN, Q_MAX, QD_MAX, MARGIN, DECELERATION, excess, intrusion)
     assert some == (excess.any() or intrusion.any())
     joint_stop_torque(out, M_inv, qd, excess, intrusion, MARGIN, *gains(excess, intrusion, inertia))

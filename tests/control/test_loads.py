@@ -271,7 +271,7 @@ def test_what_no_tool_carries_is_refused_and_nothing_changes(panda, given, told)
 
 def test_a_load_joins_the_tool_as_mujoco_would_weld_it(panda):
     """Inertia, gravity and bias of the joined body are those of two bodies welded together."""
-    spec = mujoco.MjSpec.from_string(arm_mjcf(panda.facts, panda.tool))
+    spec = mujoco.MjSpec.from_string(arm_mjcf(panda.description, panda.tool))
     body = spec.body("tool").add_body(name="load", pos=panda.model.site("tcp").pos)
     body.mass, body.ipos, body.inertia, body.explicitinertial = 1.2, COM, np.diag(INERTIA), True
     welded = mujoco.MjData(spec.compile())

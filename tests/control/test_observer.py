@@ -37,7 +37,7 @@ def test_controller_takes_a_step_up_as_its_gain_says(panda, preset):
         controller.record["state"]["tau"] = controller.record["dynamics"]["g"] - tau
         out = controller.step(still, hold(panda))
         assert_allclose(out.residual, tau * (1 - math.exp(-config.observer_gain * 0.001 * k)), rtol=1e-9, atol=1e-9)
-        trigger = tau * (1 - math.exp(-config.trigger_gain * 0.001 * k))
+        trigger = tau * (1 - math.exp(-config.detection_gain * 0.001 * k))
         assert_allclose(out.contact.torque, trigger, rtol=1e-9, atol=1e-9)
 
 

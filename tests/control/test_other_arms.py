@@ -31,8 +31,8 @@ def six_without_geoms():
     """Nothing is known of its surface: where it is touched must be guessed from the joints alone."""
     known = six().arm
     arm = robots.from_mjcf(known.model, site="tip", home=known.home)
-    assert len(known.skin) == 480
-    assert len(arm.skin) == 0
+    assert len(known.surface) == 480
+    assert len(arm.surface) == 0
     return Scene(arm.model, arm, "link3")
 
 

@@ -20,9 +20,9 @@ def test_twenty_laps_without_a_posture_bring_the_elbow_back(panda):
                 offset[list(plane)] = 0.1 * np.array([math.cos(angle) - 1.0, math.sin(angle)])
                 controller.set_target(reach(panda, offset)._replace(posture=None))
                 if lap == 0 and angle == 0.0:
-                    first = controller.record["target"]["q_pose"].copy()
+                    first = controller.record["target"]["q_posture"].copy()
         controller.set_target(home._replace(posture=None))
-        assert np.abs(controller.record["target"]["q_pose"] - first).max() < 1e-3
+        assert np.abs(controller.record["target"]["q_posture"] - first).max() < 1e-3
 
 
 def test_where_the_arm_stands_has_no_say(panda):
@@ -32,7 +32,7 @@ def test_where_the_arm_stands_has_no_say(panda):
         controller = controller_at(panda, presets.safe())
         controller.reset(panda.home + aside)
         controller.set_target(target)
-        found.append(controller.record["target"]["q_pose"].copy())
+        found.append(controller.record["target"]["q_posture"].copy())
     assert_array_equal(*found)
 
 

@@ -15,7 +15,7 @@ from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
 
-INSTANT = {"observer_gain": 1e6, "trigger_gain": 1e6, "residual_cutoff_hz": math.inf}
+INSTANT = {"observer_gain": 1e6, "detection_gain": 1e6, "residual_cutoff_hz": math.inf}
 
 
 class Felt:
@@ -100,7 +100,7 @@ def test_contact_is_released_only_after_quiet(panda):
     ],
 )
 def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(panda, torque, link):
-    felt = Felt(replace(panda, skin=panda.skin[:0]), presets.paper())
+    felt = Felt(replace(panda, surface=panda.surface[:0]), presets.paper())
     felt.feel(np.array(torque, dtype=float))
     assert felt.out.contact.link == link
     assert felt.out.contact.in_contact == (link > 0)
@@ -108,8 +108,8 @@ def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(p
 
 @pytest.mark.parametrize("index", [215, 275, 335, 380, 430])
 def test_link_of_an_arm_with_skin_is_the_one_whose_skin_explains_the_torque(panda, index):
-    """The torque of 20 N on one point of the skin, not only the furthest joint that shows it."""
-    row = panda.skin[index]
+    """The torque of 20 N on one point of the surface, not only the furthest joint that shows it."""
+    row = panda.surface[index]
     bent = replace(panda, home=panda.home + np.array([0.2, 0.3, -0.4, 0.3, 0.5, 0.3, -0.2]))
     data = mujoco.MjData(panda.model)
     data.qpos[:] = bent.home
@@ -145,7 +145,9 @@ def test_direction_is_that_of_the_torque_last_felt(panda):
 
 def pressing(panda, offset=0.05):
     """A target beyond an obstacle, its bound 2 N m; and the torque of an obstacle that stands before it."""
-    config = replace(presets.paper(), recover_s=0.2, push_yield_nm=2.0, push_meet_n=0.0)
+    config = replace(
+        presets.paper(), recover_s=0.2, contact_torque_limit_comply_nm=2.0, contact_force_limit_initial_n=0.0
+    )
     obstacle = panda.dynamics(panda.home, np.zeros(7))["J"][1] * -20.0
     return Felt(panda, config, reach(panda, [0.0, offset, 0.0])), obstacle
 
@@ -154,25 +156,25 @@ def test_tasks_pull_gives_way_at_once_and_comes_back_slowly(panda):
     """Scaled as a whole until contact ends, then 1 − (1 − share) exp(−t/recover_s) of it."""
     felt, obstacle = pressing(panda)
     state = felt.controller.record["state"]
-    assert state["task_share"] == 1.0
+    assert state["task_scale"] == 1.0
     felt.feel(obstacle)
-    share = float(state["task_share"])
+    share = float(state["task_scale"])
     assert share < 0.9
     modes = felt.feel(obstacle, 100) + felt.feel(np.zeros(7), 250)
     assert modes == [True] * 100 + [False] * 250
-    assert_allclose(state["task_share"], 1 - (1 - share) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
+    assert_allclose(state["task_scale"], 1 - (1 - share) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
 
 
 def test_task_pulls_whole_again_at_once_where_nothing_delays_it(panda):
     felt, obstacle = pressing(panda)
-    felt.controller.record["params"]["recover_share"] = 1.0
+    felt.controller.record["params"]["recover_gain"] = 1.0
     felt.feel(obstacle, 100)
     felt.feel(np.zeros(7))
-    assert felt.controller.record["state"]["task_share"] == 1.0
+    assert felt.controller.record["state"]["task_scale"] == 1.0
 
 
 def test_paper_takes_nothing_off_the_task(panda):
     felt = Felt(panda, presets.paper(), reach(panda, [0.0, 0.05, 0.0]))
     felt.feel(pressing(panda)[1], 10)
     assert felt.out.contact.in_contact
-    assert felt.controller.record["state"]["task_share"] == 1.0
+    assert felt.controller.record["state"]["task_scale"] == 1.0

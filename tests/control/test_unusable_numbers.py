@@ -68,7 +68,7 @@ def test_a_wrench_that_is_not_measured_is_not_looked_at(running):
 
 @pytest.mark.parametrize(
     ("field", "value", "text"),
-    [(field, value, FAULTS[2]) for field in ("position", "quat", "K_task", "D_task", "q_pose") for value in UNUSABLE]
+    [(field, value, FAULTS[2]) for field in ("position", "quat", "K_task", "D_task", "q_posture") for value in UNUSABLE]
     + [
         ("quat", 0.9, "target quaternion is not of unit length; the last good target holds"),
         ("K_task", 9.99, "target stiffness or damping is out of range; the last good target holds"),

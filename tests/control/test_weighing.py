@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach
 
 from contactsafe import presets
-from contactsafe.control.laws import weigh
+from contactsafe.control.laws import identify_masses
 from contactsafe.robot.dynamics import dynamics_dtype, mass_regressor, update_dynamics
 
 SAFE = replace(presets.safe(), friction_compensation=False)
@@ -34,7 +34,7 @@ def test_readings_only_ever_narrow_what_is_believed(seed, m):
     for _ in range(30):
         before = P.copy()
         row = rng.normal(size=m) * 10.0 ** rng.uniform(-2, 2)
-        weigh(error, P, row, rng.normal() * 5.0, rng.uniform(0.01, 2.0), ANY)
+        identify_masses(error, P, row, rng.normal() * 5.0, rng.uniform(0.01, 2.0), ANY)
         assert psd(P)
         assert psd(before - P)
         assert np.isfinite(error).all()
@@ -46,7 +46,7 @@ def test_masses_are_found_from_readings_of_an_arm_at_rest(seed):
     truth, error, P = rng.uniform(-0.1, 0.1, 8), np.zeros(8), 0.01 * np.eye(8)
     for _ in range(400):
         row = rng.normal(size=8) * 5.0
-        weigh(error, P, row, row @ (truth - error), 0.01, ANY)
+        identify_masses(error, P, row, row @ (truth - error), 0.01, ANY)
     assert_allclose(error, truth, rtol=0, atol=2e-3)
 
 
@@ -64,7 +64,7 @@ def test_gravity_of_an_arm_is_found_from_a_few_postures(panda):
 
     for _ in range(60):
         for row in regressor():
-            weigh(error, P, row, row @ (truth - error), 0.01, ANY)
+            identify_masses(error, P, row, row @ (truth - error), 0.01, ANY)
     rows = np.concatenate([regressor() for _ in range(50)])
     assert np.abs(rows @ truth).max() > 1.0
     assert np.abs(rows @ (truth - error)).max() < 0.05 * np.abs(rows @ truth).max()

@@ -69,7 +69,7 @@ def test_contact_of_the_arm_is_found_while_the_tool_wipes(panda):
         plant.step(out.torque + J.T @ wrench)
         assert k >= 700 or not out.contact.in_contact
         if k == 730:
-            torque = controller.record["state"]["arm_torque_trigger"].copy()
+            torque = controller.record["state"]["arm_torque_fast"].copy()
             truth = plant.push_torque()
     assert out.contact.in_contact
     assert np.linalg.norm(torque - truth) < 0.35 * np.linalg.norm(truth)
@@ -112,4 +112,4 @@ def test_obstacle_before_the_wrist_is_pressed_no_harder_than_one_before_the_tool
     for k in range(120):
         ahead = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
         plant.run(controller, reach(panda, [0.0, ahead, 0.0]), 17)
-    assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < SAFE.push_tool_n
+    assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < SAFE.tool_force_limit_n

@@ -99,7 +99,7 @@ def test_tilt_keeps_to_its_range(tasks):
 def test_the_posture_follows_x_d(tasks):
     act(tasks, 1, 1.0, steps=6)
     target = tasks.worlds.controllers[0]["target"]
-    pose = tasks.arm.tool_pose(target["q_pose"])
+    pose = tasks.arm.tool_pose(target["q_posture"])
     assert_allclose(pose.position, target["position"], atol=1e-3)
     assert abs(pose.quat @ target["quat"]) > 1 - 1e-4
 
@@ -111,7 +111,7 @@ def test_the_posture_does_not_depend_on_the_way_of_x_d(tasks):
             act(tasks, index, value, steps=8)
         target = tasks.worlds.controllers[0]["target"]
         pose = Pose(target["position"].copy(), target["quat"].copy())
-        assert_allclose(target["q_pose"], InverseKinematics(tasks.arm).posture(pose), rtol=0, atol=1e-9)
+        assert_allclose(target["q_posture"], InverseKinematics(tasks.arm).posture(pose), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("rotvec", [(0.0, 0.0, 0.0), (0.1, -0.05, 0.02), (0.0, 0.0, 0.8)])

@@ -86,7 +86,7 @@ def test_ink_is_counted_and_the_nearest_found_and_an_object_is_no_ink():
         origin = worlds.plants[i]["origin"]
         at = origin + (np.argwhere(worlds.cells[i] == INK) + 0.5) * cell
         place = np.add(origin, [0.07, 0.11])
-        count, distance = nearest_ink(worlds.ledger, i, worlds.cells[i], origin, cell, place)
+        count, distance = nearest_ink(worlds.ink_index, i, worlds.cells[i], origin, cell, place)
         assert count == len(at)
         assert distance == pytest.approx(np.linalg.norm(at - place, axis=1).min(), abs=1e-12)
 

@@ -51,7 +51,7 @@ def test_a_step_in_the_air_costs_time_and_pays_approach_only():
 def test_the_ink_is_paid_once_in_shares_and_done_once(finished):
     _, tasks, terms = finished
     assert tasks.tasks["clean"].all()
-    assert_allclose(terms[:, :, 0].sum(axis=0), REWARD.ink, rtol=2 * TASK.clean_share)
+    assert_allclose(terms[:, :, 0].sum(axis=0), REWARD.ink, rtol=2 * TASK.clean_fraction)
     for i in range(4):
         first = int(np.argmax(terms[:, i, 1] > 0))
         assert terms[first, i, 1] == REWARD.done
@@ -68,7 +68,7 @@ def test_a_hard_press_costs_more_than_contact_pays():
 
 def test_nothing_that_leaves_the_ink_can_pay_what_finishing_at_the_last_moment_pays():
     """Bounds by the configuration: approach is a difference, contact is less than time takes."""
-    latest = REWARD.ink * (1 - TASK.clean_share) + REWARD.done + STEPS * REWARD.time
+    latest = REWARD.ink * (1 - TASK.clean_fraction) + REWARD.done + STEPS * REWARD.time
     hovering = STEPS * REWARD.time
     pressing = STEPS * (REWARD.time + REWARD.contact)
     circling = REWARD.approach * np.hypot(BOARD_EDGE_M, BOARD_EDGE_M) + STEPS * REWARD.time
@@ -77,7 +77,7 @@ def test_nothing_that_leaves_the_ink_can_pay_what_finishing_at_the_last_moment_p
 
 def test_stopping_short_pays_less_than_finishing_whatever_is_left():
     """From any board, one more step that cleans it beats resting on it, in contact, until time is up."""
-    for left in np.linspace(TASK.clean_share, 1.0, 20):
+    for left in np.linspace(TASK.clean_fraction, 1.0, 20):
         for steps_left in (1, 10, STEPS):
             finishing = REWARD.ink * left + REWARD.done + REWARD.time
             resting = steps_left * (REWARD.contact + REWARD.time)

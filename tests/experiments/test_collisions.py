@@ -7,7 +7,7 @@ import pytest
 
 from contactsafe import presets
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import LINKS, draw_motion
+from contactsafe.experiments.collision_scenes import LINKS, sample_motion
 from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.motions import record
@@ -66,7 +66,7 @@ def test_what_replays_a_trial_is_a_command_for_presets_and_python_for_others(bat
     assert worst["replay"] == (
         f"contactsafe experiment collisions --controllers vices,safe --trials 1 --out trial-{seed} --seed {seed}"
     )
-    own = {"vices": presets.vices(), "softer": replace(presets.safe(), push_yield_n=8.0)}
+    own = {"vices": presets.vices(), "softer": replace(presets.safe(), contact_force_limit_comply_n=8.0)}
     (row,) = run_battery(own, [3], ["clean"]).tables[1].as_records()
     assert row["replay"] == "run_battery(controllers, [3])"
 
@@ -94,7 +94,7 @@ def test_progress_adds_up_to_what_was_announced():
 def test_worlds_lent_from_controller_to_controller_do_what_new_ones_do():
     """An obstacle whose hold travels was left where the run before had pushed it."""
     arm = robots.panda()
-    motion = draw_motion(arm, 2)
+    motion = sample_motion(arm, 2)
     assert motion.holds
     thing = Obstacle((0.3, 0.1, 0.7), 0.05, 3e3, 1.0, travel=(0.1, 0.0, 0.0), travel_s=(0.2, 0.6))
     config = motion.world((thing,), real=True)
@@ -129,7 +129,7 @@ def test_metrics_are_what_they_say():
     expected = {
         "met": 1.0, "contact_peak_n": 40.0, "contact_steady_n": 4.0, "impulse_ns": 6.0, "tau_peak_nm": 7.0,
         "tau_steady_nm": 0.0, "detect_ms": 12.0, "tool_error_mm": 30.0, "tool_error_end_mm": 30.0,
-        "tool_force_peak_n": 0.0, "yielding_share": 0.1, "holding_share": 0.1, "mode_switches": 2.0,
+        "tool_force_peak_n": 0.0, "comply_fraction": 0.1, "reject_fraction": 0.1, "mode_switches": 2.0,
         "limit_touches": 1.0,
     }  # fmt: skip
     assert found == pytest.approx(expected)

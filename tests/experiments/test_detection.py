@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from contactsafe import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import detection as subject
-from contactsafe.experiments.collision_scenes import draw_motion
+from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.detection import (
     CONTACT,
@@ -21,10 +21,10 @@ from contactsafe.experiments.detection import (
     alarm_trials,
     contact_metrics,
     detection,
-    draw_push,
-    draw_strokes,
+    paint_strokes,
     push_trials,
     reporting,
+    sample_push,
     step_metrics,
 )
 from contactsafe.experiments.registry import ENTRIES
@@ -40,7 +40,7 @@ PUSH = Push(5, np.zeros(3), np.array([0.0, 20.0, 0.0]), np.array([3.0, 0, 0, 0, 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_push_puts_the_torque_on_the_joints_that_it_claims(seed):
     """The simulator's own Jacobian says the same."""
-    push = draw_push(ARM, ARM.home, np.random.default_rng(seed), CONTACT)
+    push = sample_push(ARM, ARM.home, np.random.default_rng(seed), CONTACT)
     worlds = Worlds(ARM, WorldConfig(sensors=NO_NOISE), presets.vices(), 1, 0)
     worlds.reset(0, ARM.home)
     worlds.push(0, f"link{push.link}", push.point, push.force, 0.0, 1.0, ramp_s=0.001)
@@ -52,7 +52,7 @@ def test_a_push_puts_the_torque_on_the_joints_that_it_claims(seed):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_step_puts_3_nm_on_its_largest_joint_with_100_n_at_most(seed):
-    push = draw_push(ARM, ARM.home, np.random.default_rng(seed), STEP)
+    push = sample_push(ARM, ARM.home, np.random.default_rng(seed), STEP)
     assert np.abs(push.torque).max() == pytest.approx(3.0)
     assert np.linalg.norm(push.force) <= 100.0
     assert push.link in LINKS
@@ -95,7 +95,7 @@ def test_a_pushed_scene_does_the_same_alone_and_among_others():
 
 
 def test_strokes_go_to_and_fro_on_the_way_no_faster_than_their_speed():
-    stroke = draw_strokes(ARM, 0, 1)[0]
+    stroke = paint_strokes(ARM, 0, 1)[0]
     places = np.array([stroke.target(time_s) for time_s in np.arange(0.0, 20.0, 0.001)])
     share = (places - stroke.start.position) @ stroke.way / stroke.length_m**2
     assert share.min() == 0.0
@@ -105,8 +105,8 @@ def test_strokes_go_to_and_fro_on_the_way_no_faster_than_their_speed():
 
 
 def test_strokes_leave_holds_out():
-    strokes = draw_strokes(ARM, 0, 8)
-    holds = [seed for seed in range(strokes[-1].seed) if draw_motion(ARM, seed).holds]
+    strokes = paint_strokes(ARM, 0, 8)
+    holds = [seed for seed in range(strokes[-1].seed) if sample_motion(ARM, seed).holds]
     assert holds
     assert not {stroke.seed for stroke in strokes} & set(holds)
 
@@ -118,7 +118,7 @@ def short(monkeypatch):
 
 @pytest.mark.usefixtures("short")
 def test_a_controller_that_is_never_sure_gives_false_alarms():
-    strokes = draw_strokes(ARM, 0, 2)
+    strokes = paint_strokes(ARM, 0, 2)
     (first, _) = alarm_trials(ARM, "nervous", replace(presets.safe(), residual_threshold=0.05), strokes)
     (calm, _) = alarm_trials(ARM, "calm", replace(presets.safe(), residual_threshold=50.0), strokes)
     assert first.metrics["false_alarms"] >= 1.0

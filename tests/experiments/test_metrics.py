@@ -31,7 +31,7 @@ def test_wiping_counts_force_only_while_the_pad_touches():
     assert metrics["tool_force_peak_n"] == metrics["tool_force_p95_n"] == 10.0
     assert metrics["landing_peak_n"] == 10.0
     assert (metrics["stiffness_z_free"], metrics["stiffness_z_contact"]) == (80.0, 200.0)
-    assert metrics["contact_mode_share"] == 0.1
+    assert metrics["contact_mode_fraction"] == 0.1
     assert math.isnan(metrics["time_s"])
     assert wiping_metrics(run, clean=True)["time_s"] == 0.999
 

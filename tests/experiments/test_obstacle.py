@@ -23,7 +23,7 @@ def probe():
 
 def distance_to_arm(tasks, q, point):
     """From a point to the nearest of the forearm's surfaces, m."""
-    starts, ends, radii, links = arm_capsules(tasks.arm.facts, tasks.arm.tool, q[None])
+    starts, ends, radii, links = arm_capsules(tasks.arm.description, tasks.arm.tool, q[None])
     gaps = []
     for k in np.flatnonzero(links == 5):
         along = ends[0, k] - starts[0, k]
@@ -58,7 +58,7 @@ def test_the_place_is_its_seeds(probe):
 def test_forearm_is_the_thickest_capsule_of_link_5(probe):
     middle, radius = forearm(probe.arm, over(probe, 0.0))
     assert radius == 0.06
-    starts, ends, radii, links = arm_capsules(probe.arm.facts, probe.arm.tool, over(probe, 0.0)[None])
+    starts, ends, radii, links = arm_capsules(probe.arm.description, probe.arm.tool, over(probe, 0.0)[None])
     k = next(k for k in np.flatnonzero(links == 5) if radii[k] == 0.06)
     assert_allclose(middle, (starts[0, k] + ends[0, k]) / 2)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from contactsafe.robot import robots
-from contactsafe.robot.arm import arm_from_facts
-from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Joint, Link, Tool
+from contactsafe.robot.arm import arm_from_description
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tool
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +40,7 @@ def states(arms):
 
 
 def _random_arm(rng, n):
-    facts = ArmFacts(
+    description = ArmDescription(
         name=f"random{n}",
         source="random",
         base=_random_inertia(rng),
@@ -61,7 +61,7 @@ def _random_arm(rng, n):
         home=(0.3,) * n,
     )
     tool = Tool("random", _random_inertia(rng), _tuple(rng.uniform(-0.2, 0.2, 3)), (), (0.03, 0.02, 0.01))
-    return arm_from_facts(facts, tool)
+    return arm_from_description(description, tool)
 
 
 def _random_inertia(rng):

@@ -13,7 +13,7 @@ TIGHT = {"rtol": 0.0, "atol": 1e-9}
 
 @pytest.fixture(scope="module")
 def models(arms):
-    return {arm.name: pinocchio.buildModelFromXML(arm_urdf(arm.facts, arm.tool)) for arm in arms}
+    return {arm.name: pinocchio.buildModelFromXML(arm_urdf(arm.description, arm.tool)) for arm in arms}
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def cases(models, states):
     found = []
     for arm, q, qd in states:
         model = models[arm.name]
-        model.armature = arm.facts.joint_array("armature")
+        model.armature = arm.description.joint_array("armature")
         found.append((model, q, qd, arm.dynamics(q, qd)))
     return found
 

@@ -1,4 +1,4 @@
-"""MJCF and URDF are written from the same facts, and say the same."""
+"""MJCF and URDF are written from the same description, and say the same."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -10,19 +10,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from contactsafe.robot import robots
-from contactsafe.robot.facts import Capsule
+from contactsafe.robot.description import Capsule
 from contactsafe.robot.mjcf import arm_mjcf, numbers
 from contactsafe.robot.urdf import _capsule, arm_urdf
 
 
 @pytest.fixture(scope="module")
 def urdf(panda):
-    return ET.fromstring(arm_urdf(panda.facts, panda.tool))
+    return ET.fromstring(arm_urdf(panda.description, panda.tool))
 
 
 def test_same_mass_of_every_body(arms):
     for arm in arms:
-        urdf = ET.fromstring(arm_urdf(arm.facts, arm.tool))
+        urdf = ET.fromstring(arm_urdf(arm.description, arm.tool))
         masses = {
             link.get("name"): float(link.find("inertial/mass").get("value")) for link in urdf.iterfind("link[inertial]")
         }
@@ -38,7 +38,7 @@ def test_same_limits(panda, urdf):
 
 
 def test_same_tool_frame_at_home(panda):
-    model = pinocchio.buildModelFromXML(arm_urdf(panda.facts, panda.tool))
+    model = pinocchio.buildModelFromXML(arm_urdf(panda.description, panda.tool))
     data = model.createData()
     pinocchio.framesForwardKinematics(model, data, panda.home)
     frame = data.oMf[model.getFrameId("tcp")]
@@ -48,7 +48,7 @@ def test_same_tool_frame_at_home(panda):
 
 
 def test_rotor_inertia_is_in_the_mjcf(panda):
-    assert_array_equal(panda.model.dof_armature, panda.facts.joint_array("armature"))
+    assert_array_equal(panda.model.dof_armature, panda.description.joint_array("armature"))
 
 
 @pytest.mark.parametrize(("tool", "beyond_flange"), [(robots.HAND, 0.1034), (robots.WIPING_PAD, 0.130)])
@@ -96,5 +96,5 @@ def test_pad_ends_at_the_tool_point(panda):
 
 
 def test_texts_do_not_change_from_call_to_call(panda):
-    assert arm_urdf(panda.facts, panda.tool) == arm_urdf(panda.facts, panda.tool)
-    assert arm_mjcf(panda.facts, panda.tool) == arm_mjcf(panda.facts, panda.tool)
+    assert arm_urdf(panda.description, panda.tool) == arm_urdf(panda.description, panda.tool)
+    assert arm_mjcf(panda.description, panda.tool) == arm_mjcf(panda.description, panda.tool)

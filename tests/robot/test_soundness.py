@@ -154,8 +154,8 @@ def test_friction_that_is_none_or_drives_its_joint_is_refused(panda, column, val
         ("torque_rate_max", "fast", "torque_rate_max is str, not numbers; give one number"),
         ("torque_rate_max", np.full(7, 1e3), "torque_rate_max has shape (7,); give one number"),
         ("lever_doubted", np.nan, "lever_doubted = nan m; give a finite number from 0 on"),
-        ("skin", [[0.0] * 6], "skin has shape (1, 6); give 1 × 7 numbers"),
-        ("skin", [[np.inf] * 7], "skin of arm 'panda' has a number that is not finite; give finite points"),
+        ("surface", [[0.0] * 6], "surface has shape (1, 6); give 1 × 7 numbers"),
+        ("surface", [[np.inf] * 7], "surface of arm 'panda' has a number that is not finite; give finite points"),
     ],
 )
 def test_arms_of_another_number_of_joints_or_of_no_numbers_are_refused(panda, field, value, text):

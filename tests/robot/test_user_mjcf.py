@@ -129,7 +129,7 @@ def test_bound_motors_exert_the_torque_asked_for(scene):
 def test_round_trip_through_a_file(tmp_path, tool):
     panda = robots.panda(tool)
     path = tmp_path / "panda.xml"
-    path.write_text(arm_mjcf(panda.facts, tool), encoding="utf-8")
+    path.write_text(arm_mjcf(panda.description, tool), encoding="utf-8")
     read = robots.from_mjcf(path, site="tcp", friction=panda.friction, home=panda.home)
     for field in ("name", "site", "q_min", "q_max", "tau_max", "torque_rate_max", "friction", "home"):
         assert_array_equal(getattr(read, field), getattr(panda, field))

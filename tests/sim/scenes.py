@@ -46,7 +46,7 @@ def aim(worlds, position, i=0, stiffness=150.0, follow=True, quat=DOWN):
     target["position"], target["quat"] = position, quat
     target["K_task"], target["D_task"] = stiffness, 2.0 * np.sqrt(stiffness)
     if follow:
-        target["q_pose"] = posture(position, quat)
+        target["q_posture"] = posture(position, quat)
 
 
 def run(worlds, ticks):

@@ -87,7 +87,7 @@ def test_a_mask_holds_0_and_255_only_and_a_clean_board_is_blank(worlds):
     board.clear()
     worlds.place(0, posture((0.5, 0.0, BOARD_Z + 0.02)))
     assert (worlds.render()[0] == 255).all()
-    board.draw_random(np.random.default_rng(0))
+    board.sample_random(np.random.default_rng(0))
     assert set(np.unique(worlds.render()[0])) == {0, 255}
 
 
@@ -120,14 +120,14 @@ def test_the_arm_hides_ink(worlds):
 
 def nearly_clean(board):
     """A random drawing with a broad track wiped through it."""
-    board.draw_random(np.random.default_rng(4))
+    board.sample_random(np.random.default_rng(4))
     area = (board.cells == INK).any(axis=0).nonzero()[0]
     board.cells[:, area[len(area) // 5] : area[-len(area) // 5]] = CLEAN
 
 
 BOARDS = {
-    "strokes": lambda board: board.draw_random(np.random.default_rng(1)),
-    "other strokes": lambda board: board.draw_random(np.random.default_rng(7)),
+    "strokes": lambda board: board.sample_random(np.random.default_rng(1)),
+    "other strokes": lambda board: board.sample_random(np.random.default_rng(7)),
     "nearly clean": nearly_clean,
     "covered": lambda board: board.draw(np.ones((1, 1))),
 }

@@ -11,7 +11,7 @@ from sklearn.datasets import load_digits
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim import handwriting
 from contactsafe.sim.config import BoardConfig
-from contactsafe.sim.drawings import BOARDS, draw_board
+from contactsafe.sim.drawings import BOARDS, paint_board
 from contactsafe.sim.whiteboard import INK, Whiteboard
 
 CONFIG = BoardConfig()
@@ -20,7 +20,7 @@ WRITTEN = [kind for kind in BOARDS if kind != "strokes"]
 
 def drawn(kind, seed):
     board = Whiteboard(CONFIG)
-    draw_board(board, kind, np.random.default_rng(seed))
+    paint_board(board, kind, np.random.default_rng(seed))
     return board.cells == INK
 
 
@@ -32,7 +32,7 @@ def test_boards_are_their_seeds(kind):
 
 def test_strokes_are_the_random_drawings_there_always_were():
     board = Whiteboard(CONFIG)
-    board.draw_random(np.random.default_rng(4))
+    board.sample_random(np.random.default_rng(4))
     assert_array_equal(drawn("strokes", 4), board.cells == INK)
 
 
@@ -61,7 +61,7 @@ def test_lines_are_as_wide_as_a_pen(kind):
 def test_a_drawing_replaces_what_was_there():
     board = Whiteboard(CONFIG)
     board.draw(np.ones((1, 1)))
-    draw_board(board, "digits", np.random.default_rng(0))
+    paint_board(board, "digits", np.random.default_rng(0))
     assert_array_equal(board.cells == INK, drawn("digits", 0))
 
 
@@ -84,7 +84,7 @@ def test_digits_stay_legible():
 @pytest.mark.parametrize("kind", ["crayon", "", "Digits"])
 def test_other_kinds_are_refused(kind):
     with pytest.raises(InvalidInputError) as caught:
-        draw_board(Whiteboard(CONFIG), kind, np.random.default_rng(0))
+        paint_board(Whiteboard(CONFIG), kind, np.random.default_rng(0))
     assert str(caught.value) == f"boards = {kind!r}; choose strokes, digits, text or handwriting"
 
 

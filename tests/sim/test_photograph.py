@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import CALM, panda, posture
 
-from contactsafe.sim.drawings import BOARDS, draw_board
-from contactsafe.sim.photograph import PHOTO_PX, Photographer, draw_conditions
+from contactsafe.sim.drawings import BOARDS, paint_board
+from contactsafe.sim.photograph import PHOTO_PX, Photographer, sample_conditions
 from contactsafe.sim.whiteboard import INK
 from contactsafe.sim.world import Worlds
 from contactsafe.vision.segment import Segmenter
@@ -36,7 +36,7 @@ class Studio:
         return self.photographer.solids(self.worlds.datas[0])
 
     def photograph(self, seed, severity):
-        conditions = draw_conditions(np.random.default_rng(seed), severity)
+        conditions = sample_conditions(np.random.default_rng(seed), severity)
         return self.photographer.take_under(conditions, self.board.cells, self.solids, seed)
 
     def masks(self, seed, severity):
@@ -62,7 +62,7 @@ def test_ink_in_photographs_is_found_where_it_is(studio, kind):
     for seed in range(40):
         rng = np.random.default_rng(seed)
         studio.board.clear()
-        draw_board(studio.board, kind, rng)
+        paint_board(studio.board, kind, rng)
         studio.place(anywhere(rng))
         found, there = studio.masks(seed, seed / 39)
         both, either = both + (found & there).sum(), either + (found | there).sum()
@@ -132,7 +132,7 @@ def test_the_homography_is_the_masks_scaled(studio):
 
 def test_a_photograph_is_its_seed_and_number(studio):
     studio.board.clear()
-    draw_board(studio.board, "strokes", np.random.default_rng(1))
+    paint_board(studio.board, "strokes", np.random.default_rng(1))
     studio.place((0.5, 0.0, 0.05))
     take = studio.photographer.take
     first = take(studio.board.cells, studio.solids, 3, 7)
@@ -147,13 +147,13 @@ def test_a_photograph_is_its_seed_and_number(studio):
 
 
 def test_severity_widens_every_condition_and_zero_is_an_even_light():
-    calm = [draw_conditions(np.random.default_rng(seed), 0.0) for seed in range(20)]
-    harsh = [draw_conditions(np.random.default_rng(seed), 1.0) for seed in range(20)]
+    calm = [sample_conditions(np.random.default_rng(seed), 0.0) for seed in range(20)]
+    harsh = [sample_conditions(np.random.default_rng(seed), 1.0) for seed in range(20)]
     for c in calm:
         assert c.gradient == (0.0, 0.0)
         assert c.vignette == c.edge_depth == c.arm_depth == c.glare == c.smudge == 0.0
         assert c.opacity == 1.0
     for field in fields(calm[0]):
         assert len({getattr(c, field.name) for c in harsh}) > 1, field.name
-    drawn = [draw_conditions(np.random.default_rng(seed)) for seed in range(20)]
+    drawn = [sample_conditions(np.random.default_rng(seed)) for seed in range(20)]
     assert len({c.edge_depth for c in drawn}) == 20

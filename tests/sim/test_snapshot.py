@@ -25,7 +25,7 @@ def begin(worlds):
     rng = np.random.default_rng(5)
     for i in range(2):
         worlds.reset(i, posture((0.5, 0.0, 0.0105)))
-        worlds.boards[i].draw_random(rng)
+        worlds.boards[i].sample_random(rng)
         aim(worlds, (PRESSED, ABOVE)[i], i)
     worlds.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 30.0, 0.0), 0.03, 0.3)
     run(worlds, 70)
@@ -129,7 +129,7 @@ def test_a_snapshot_of_something_else_is_refused(course):
         ("plants", "tcp_site", 10**9),
         ("controllers", "state.search_at", 10**9),
         ("controllers", "state.turn", 7),
-        ("controllers", "handle.skin_points", 10**9),
+        ("controllers", "handle.surface_points", 10**9),
         ("controllers", "state.tau", np.nan),
     ],
 )

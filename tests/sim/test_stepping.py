@@ -47,7 +47,7 @@ def step_by_hand(worlds, ticks):
     torques = []
     for tick in range(ticks):
         if tick % MAX_TICKS == 0:
-            noise = worlds.draw_noise()[0]
+            noise = worlds.sample_noise()[0]
         sense(plant, controller, noise[tick % MAX_TICKS])
         tick_at(worlds.controllers, 0)
         act(plant, controller, noise[tick % MAX_TICKS])

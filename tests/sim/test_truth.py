@@ -29,7 +29,7 @@ RIGHT = (0.5, -0.15, BOARD_Z + 0.05)
 
 def beside_forearm(make, y=-0.06):
     """Hold an obstacle where the forearm's side is when the tool is at y, m."""
-    starts, ends, radii, links = arm_capsules(panda().facts, panda().tool, posture((0.5, y, RIGHT[2]))[None])
+    starts, ends, radii, links = arm_capsules(panda().description, panda().tool, posture((0.5, y, RIGHT[2]))[None])
     k = next(k for k in np.flatnonzero(links == 5) if radii[k] > 0.05)
     middle = (starts[0, k] + ends[0, k]) / 2
     return make(tuple(middle - (0.0, radii[k] + make((0, 0, 0)).radius, 0.0)))

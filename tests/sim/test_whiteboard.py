@@ -119,7 +119,7 @@ def test_random_drawings_lie_within_the_area_differ_and_are_never_empty(board):
     counts, seen = [], set()
     for seed in range(200):
         board.clear()
-        board.draw_random(np.random.default_rng(seed))
+        board.sample_random(np.random.default_rng(seed))
         inside = np.abs(centres(board)[board.cells == INK] - (0.5, 0.0)).max()
         assert inside <= CONFIG.ink_size / 2
         counts.append(board.ink_cells)
@@ -130,10 +130,10 @@ def test_random_drawings_lie_within_the_area_differ_and_are_never_empty(board):
 
 
 def test_random_drawings_are_their_seeds(board):
-    board.draw_random(np.random.default_rng(5))
+    board.sample_random(np.random.default_rng(5))
     first = board.cells.copy()
     board.clear()
-    board.draw_random(np.random.default_rng(5))
+    board.sample_random(np.random.default_rng(5))
     assert_array_equal(board.cells, first)
 
 

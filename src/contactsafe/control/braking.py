@@ -15,14 +15,14 @@ _SHARE = 0.25
 
 
 @compiled
-def braking_share(qd, speed, c, speed_max, tau_max):
+def braking_fraction(qd, speed, c, speed_max, tau_max):
     """Return how much of a command a brake must replace, 0 … 1: all of it where the arm is too fast.
 
     That is where a joint is as fast as its limit, or will be before the torque that drives it can be taken off, or
     where the arm's motion by itself asks a motor for half of its torque.
 
     Args:
-        qd, speed: now, and by then, (n,), rad/s; see `limits.coming_speed`.
+        qd, speed: now, and by then, (n,), rad/s; see `limits.predict_velocity`.
         c: Coriolis and centrifugal torque, (n,), N m; grows with the square of speed.
         speed_max: (n,), rad/s.
         tau_max: (n,), N m.

@@ -321,7 +321,7 @@ def _net_torque(c, out):
     """
     state, dynamics = c.state, c.dynamics
     touched = state.mode == CONTACT
-    external = state.residual_trigger if touched else state.residual
+    external = state.residual_fast if touched else state.residual
     out[:] = 0.0
     if state.has_wrench != 0 and c.params.cancel_tool_wrench != 0 and state.braking == 0:
         matvec_t_into(dynamics.J, state.wrench_ee, out)
@@ -345,12 +345,12 @@ def set_step(c, ticks):
     """Resolve what a tick's filters and times come to when so many ticks passed in it."""
     step, params = c.state.step, c.params
     step.ticks, step.dt = ticks, ticks * params.dt
-    step.trigger_share = _over(params.trigger_share, ticks)
-    step.observer_share = _over(params.observer_share, ticks)
-    step.lowpass_share = _over(params.lowpass_share, ticks)
-    step.recover_share = _over(params.recover_share, ticks)
-    step.probe_share = _over(params.probe_share, ticks)
-    step.hold_share = _over(params.hold_share, ticks)
+    step.detection_filter_gain = _over(params.detection_filter_gain, ticks)
+    step.compensation_filter_gain = _over(params.compensation_filter_gain, ticks)
+    step.lowpass_gain = _over(params.lowpass_gain, ticks)
+    step.recover_gain = _over(params.recover_gain, ticks)
+    step.probe_gain = _over(params.probe_gain, ticks)
+    step.reject_recover_gain = _over(params.reject_recover_gain, ticks)
     step.tool_share = _over(params.tool_share, ticks)
     step.torque_step = params.torque_step * min(ticks, 1.0)
 
@@ -405,4 +405,4 @@ def stop_late_target(c):
         target.position += coasts[:3]
     if dot(error[3:], error[3:]) > dot(coasts[3:], coasts[3:]):
         target.quat[:] = quat_multiply(rotvec_to_quat(coasts[3:]), matrix_to_quat(dynamics.rotation))
-    target.q_pose[:] = state.q
+    target.q_posture[:] = state.q

@@ -8,15 +8,16 @@ import numpy as np
 from contactsafe.control.damping import GAIN_MARGIN, largest_damping
 from contactsafe.core.errors import InvalidInputError
 
-_PER_JOINT = ("K_pose", "D_pose")
+_PER_JOINT = ("K_posture", "D_posture")
 _POSITIVE = (
-    "dt", "loop_delay_s", "observer_gain", "trigger_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n",
-    "meet_s", "hold_s", "tank_s", "target_timeout_s",
+    "dt", "loop_delay_s", "observer_gain", "detection_gain", "residual_cutoff_hz", "joint_margin", "tool_contact_n",
+    "contact_force_limit_decay_s", "hold_s", "tank_s", "target_timeout_s",
 )  # fmt: skip
 _SHARES = ("release_fraction", "joint_speed_fraction", "torque_rate_fraction")
 _MAY_BE_INFINITE = (
-    "observer_gain", "trigger_gain", "residual_cutoff_hz", "residual_threshold", "push_yield_nm", "push_hold_nm",
-    "push_yield_n", "push_hold_n", "push_tool_n", "pull_max_m_s2", "pull_max_rad_s2",
+    "observer_gain", "detection_gain", "residual_cutoff_hz", "residual_threshold",
+    "contact_torque_limit_comply_nm", "contact_torque_limit_reject_nm", "contact_force_limit_comply_n",
+    "contact_force_limit_reject_n", "tool_force_limit_n", "task_acceleration_max_m_s2", "task_acceleration_max_rad_s2",
     "posture_error_max_rad", "tank_j", "target_timeout_s",
 )  # fmt: skip
 
@@ -26,12 +27,12 @@ class ControllerConfig:
     """Parameters of the contact-safe controller. Presets: `contactsafe.presets`.
 
     Attributes:
-        K_pose: K2, posture stiffness, one a joint (the last repeats or is dropped for other arms), N m/rad.
-        D_pose: D2, posture damping, N m s/rad.
+        K_posture: K2, posture stiffness, one a joint (the last repeats or is dropped for other arms), N m/rad.
+        D_posture: D2, posture damping, N m s/rad.
         contact_aware: switch to the contact-aware law on contact; False is the VICES baseline with a posture task.
         cancel_tool_wrench: take the measured tool wrench out of the residual, (14), so that it shows the arm alone.
         observer_gain: K_I of the residual that compensates, 1/s.
-        trigger_gain: K_I of the residual that triggers, names the link and gives the direction, 1/s.
+        detection_gain: K_I of the residual that triggers, names the link and gives the direction, 1/s.
         residual_cutoff_hz: low-pass behind both residuals, Hz; inf for none.
         residual_threshold: δ, N m.
         friction_uncertainty: share of the nominal friction torque that is added to δ.
@@ -48,22 +49,25 @@ class ControllerConfig:
         release_s: time the residual must have stayed below a share of δ before contact mode ends, s.
         release_fraction: that share.
         recover_s: time constant with which the task's pull comes back after it gave way to a contact, s; 0 for at once.
-        hold_recover_s: the same while something pushes the arm, s.
+        reject_recover_s: the same while something pushes the arm, s.
         null_damping: damping kept in the null-space direction that the contact removes, N m s/rad.
         contact_damping: damping of every joint while in contact, N m s/rad.
         approach_damping: damping of motion into an obstacle, along the contact's direction, N m s/rad.
-        push_yield_nm: largest commanded push along the contact while the arm is what ran into it, N m; inf for none.
-        push_hold_nm: the same while something pushes the arm, N m; inf for none.
-        push_yield_n: the same bounds as a force at the link in contact, N; inf for none. The smaller one counts.
-        push_hold_n: while something pushes the arm, N; inf for none.
-        push_meet_n: the bound with which a contact is met, N; it falls to `push_yield_n` within a few `meet_s`.
-        meet_s: time constant with which it falls, s.
-        push_tool_n: largest commanded push of the tool against what it touches, N; inf for none.
+        contact_torque_limit_comply_nm: largest commanded push along the contact while the arm
+            is what ran into it, N m; inf for none.
+        contact_torque_limit_reject_nm: the same while something pushes the arm, N m; inf for none.
+        contact_force_limit_comply_n: the same bounds as a force at the link in contact, N; inf for none.
+            The smaller one counts.
+        contact_force_limit_reject_n: while something pushes the arm, N; inf for none.
+        contact_force_limit_initial_n: the bound with which a contact is met, N; it falls to
+            `contact_force_limit_comply_n` within a few `contact_force_limit_decay_s`.
+        contact_force_limit_decay_s: time constant with which it falls, s.
+        tool_force_limit_n: largest commanded push of the tool against what it touches, N; inf for none.
         tool_contact_n: least force at the tool that counts as its contact, N.
         probe_m: way by which the arm gives way to a contact before it judges whether something pushes it, m.
         probe_s: time constant with which torque, way and the force at the tool are smoothed for that, s.
-        pusher_stiffness: of the softest thing that counts as an obstacle and not as a pusher, N/m.
-        hold_margin: the arm holds against this multiple of the pusher's torque.
+        obstacle_stiffness_min: of the softest thing that counts as an obstacle and not as a pusher, N/m.
+        reject_margin: the arm holds against this multiple of the pusher's torque.
         hold_s: time constant with which it then tries again whether the pusher is still there, s; doubled each time.
         friction_compensation: add the arm's nominal friction torque to the command, and expect it in the observer.
         stiffness_range: allowed K_task, 1/s².
@@ -75,8 +79,8 @@ class ControllerConfig:
         joint_speed_fraction: share of the arm's joint speed limits that is used.
         manipulability_floor: det(J M⁻¹ Jᵀ) below which Λ is damped, as a share of the arm's best.
         manipulability_damping: λ² at a singularity, as a share of the sixth root of that best.
-        pull_max_m_s2: largest acceleration K e that pulls the tool to its target, m/s².
-        pull_max_rad_s2: the same of its turning, rad/s².
+        task_acceleration_max_m_s2: largest acceleration K e that pulls the tool to its target, m/s².
+        task_acceleration_max_rad_s2: the same of its turning, rad/s².
         posture_error_max_rad: the posture is pulled as if it were no further away than this, rad.
         passive_gains: raise stiffness and damping no faster than keeps the impedance stable whatever is asked.
         tank_j: energy that the command may give at once, J; inf for no bound.
@@ -89,12 +93,12 @@ class ControllerConfig:
         dt: tick, s.
     """
 
-    K_pose: tuple[float, ...] = (40.0, 40.0, 40.0, 40.0, 30.0, 20.0, 10.0)
-    D_pose: tuple[float, ...] = (12.0, 12.0, 12.0, 12.0, 10.0, 8.0, 6.0)
+    K_posture: tuple[float, ...] = (40.0, 40.0, 40.0, 40.0, 30.0, 20.0, 10.0)
+    D_posture: tuple[float, ...] = (12.0, 12.0, 12.0, 12.0, 10.0, 8.0, 6.0)
     contact_aware: bool = True
     cancel_tool_wrench: bool = True
     observer_gain: float = 1.5
-    trigger_gain: float = 1.5
+    detection_gain: float = 1.5
     residual_cutoff_hz: float = 30.0
     residual_threshold: float = 1.5
     friction_uncertainty: float = 0.0
@@ -109,22 +113,22 @@ class ControllerConfig:
     release_s: float = 0.0
     release_fraction: float = 1.0
     recover_s: float = 0.0
-    hold_recover_s: float = 0.0
+    reject_recover_s: float = 0.0
     null_damping: float = 0.0
     contact_damping: float = 0.0
     approach_damping: float = 0.0
-    push_yield_nm: float = math.inf
-    push_hold_nm: float = math.inf
-    push_yield_n: float = math.inf
-    push_hold_n: float = math.inf
-    push_meet_n: float = 20.0
-    meet_s: float = 0.15
-    push_tool_n: float = math.inf
+    contact_torque_limit_comply_nm: float = math.inf
+    contact_torque_limit_reject_nm: float = math.inf
+    contact_force_limit_comply_n: float = math.inf
+    contact_force_limit_reject_n: float = math.inf
+    contact_force_limit_initial_n: float = 20.0
+    contact_force_limit_decay_s: float = 0.15
+    tool_force_limit_n: float = math.inf
     tool_contact_n: float = 3.0
     probe_m: float = 0.002
     probe_s: float = 0.01
-    pusher_stiffness: float = 1500.0
-    hold_margin: float = 2.0
+    obstacle_stiffness_min: float = 1500.0
+    reject_margin: float = 2.0
     hold_s: float = 0.5
     friction_compensation: bool = True
     stiffness_range: tuple[float, float] = (10.0, 1500.0)
@@ -136,8 +140,8 @@ class ControllerConfig:
     joint_speed_fraction: float = 0.9
     manipulability_floor: float = 0.007
     manipulability_damping: float = 0.047
-    pull_max_m_s2: float = math.inf
-    pull_max_rad_s2: float = math.inf
+    task_acceleration_max_m_s2: float = math.inf
+    task_acceleration_max_rad_s2: float = math.inf
     posture_error_max_rad: float = math.inf
     passive_gains: bool = False
     tank_j: float = math.inf

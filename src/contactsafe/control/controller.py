@@ -80,7 +80,7 @@ class Contact(NamedTuple):
 
     Attributes:
         in_contact: whether the contact-aware law is in force.
-        link: found in contact on the arm's skin, or without one the furthest whose joint residual exceeds the
+        link: found in contact on the arm's surface, or without one the furthest whose joint residual exceeds the
             threshold, 1 … n; 0 for none.
         holding: whether the contact was found to push the arm rather than to stand in its way.
         torque: estimated joint torque of the contact, (n,), N m (the triggering residual).
@@ -101,8 +101,8 @@ class Output(NamedTuple):
         residual: estimated external joint torque the law compensates, (n,), N m.
         error: x_d − x, position and rotation vector, (6,), m and rad; of the arm as predicted while `bridged` is not 0.
         limited_by: what took something off the task or the command: some of 'contact' (the bound on the push along
-            it), 'tool force' (`push_tool_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range' (joint
-            range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
+            it), 'tool force' (`tool_force_limit_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range'
+            (joint range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
         fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
         bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
         target_late: whether no new target came for so long that the tool is brought to rest.
@@ -195,7 +195,7 @@ class Controller(Independent):
         self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
         pose = self.arm.tool_pose(q)
         held = self.record["state"]["target"]
-        held["position"], held["quat"], held["q_pose"] = pose.position, pose.quat, q
+        held["position"], held["quat"], held["q_posture"] = pose.position, pose.quat, q
         held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.stiffness_range)
         held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.damping_range)
         self.record["target"] = held
@@ -363,10 +363,10 @@ class Controller(Independent):
         damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
         damping = self._gain(damping, "damping", "1/s", self.config.damping_range)
         if target.posture is None:
-            posture = self._ik.posture_near(Pose(position, quat), record["q_pose"].copy())
+            posture = self._ik.posture_near(Pose(position, quat), record["q_posture"].copy())
         else:
             posture = self._in_range(self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
-        record["position"], record["quat"], record["q_pose"] = position, quat, posture
+        record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers
 
@@ -399,7 +399,7 @@ class Controller(Independent):
             in_contact=bool(out["mode"] == CONTACT),
             link=int(out["link"]),
             holding=bool(out["holding"]),
-            torque=out["residual_trigger"].copy(),
+            torque=out["residual_fast"].copy(),
         )
         return Output(
             torque=out["torque"].copy(),

@@ -82,7 +82,7 @@ def loosen_limits(M_inv, rate, limits):
 
 
 @compiled
-def share_damping(damping, limits, out):
+def scale_damping_into(damping, limits, out):
     """Fill the share of its damping that every joint may have, (n,), 0 … 1.
 
     Args:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactsafe.control.clock import BRIDGE_TICKS
-from contactsafe.control.laws import momentum_into, observer_step, passes_elsewhere, weigh
+from contactsafe.control.laws import identify_masses, line_of_action_misses_tool, momentum_into, observer_step
 from contactsafe.control.records import FREE
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matvec_into, matvec_t_into
@@ -39,11 +39,11 @@ def start(c):
     """Begin where the arm is: momentum as measured, command as last sent; the links weigh what is said."""
     state, dynamics, params = c.state, c.dynamics, c.params
     state.started = 1
-    state.task_share, state.posture_share = 1.0, 1.0
+    state.task_scale, state.posture_scale = 1.0, 1.0
     state.tank_j = params.tank_j
     state.K_task[:] = state.target.K_task
     state.D_task[:] = state.target.D_task
-    expect_masses(c)
+    reset_mass_estimate(c)
     for i in range(state.gravity_sigma.shape[0]):
         state.gravity_sigma[i] = _gravity_sigma(c, i)
     momentum_into(dynamics.M, state.qd, state.momentum)
@@ -56,7 +56,7 @@ def start(c):
 
 
 @compiled
-def expect_masses(c):
+def reset_mass_estimate(c):
     """Begin to weigh the links anew."""
     state = c.state
     state.mass_error[:] = 0.0
@@ -113,14 +113,14 @@ def observe(c):
         return
     for i in range(n):
         tau_external[i] -= tau_tool[i]
-    observer_step(state.observed, step.observer_share, tau_external)
-    observer_step(state.observed_trigger, step.trigger_share, tau_external)
-    observer_step(state.observed_rate, step.trigger_share, rate)
-    observer_step(state.observed_ramp, step.trigger_share, ramp)
-    observer_step(state.residual, step.lowpass_share, state.observed)
-    observer_step(state.residual_trigger, step.lowpass_share, state.observed_trigger)
-    observer_step(state.momentum_rate, step.lowpass_share, state.observed_rate)
-    observer_step(state.torque_ramp, step.lowpass_share, state.observed_ramp)
+    observer_step(state.observed, step.compensation_filter_gain, tau_external)
+    observer_step(state.observed_fast, step.detection_filter_gain, tau_external)
+    observer_step(state.observed_rate, step.detection_filter_gain, rate)
+    observer_step(state.observed_ramp, step.detection_filter_gain, ramp)
+    observer_step(state.residual, step.lowpass_gain, state.observed)
+    observer_step(state.residual_fast, step.lowpass_gain, state.observed_fast)
+    observer_step(state.momentum_rate, step.lowpass_gain, state.observed_rate)
+    observer_step(state.torque_ramp, step.lowpass_gain, state.observed_ramp)
 
 
 @compiled
@@ -135,7 +135,7 @@ def _tool_torque(c, out):
     if state.has_wrench == 0 or c.params.cancel_tool_wrench == 0:
         return
     matvec_t_into(J, state.wrench_ee, out)
-    fade = 1.0 - 0.4 * min(step.trigger_share, step.lowpass_share)
+    fade = 1.0 - 0.4 * min(step.detection_filter_gain, step.lowpass_gain)
     for i in range(out.shape[0]):
         state.felt[i] = max(abs(out[i]), (1.0 - step.tool_share) * state.felt[i])
         state.unseen[i] *= fade
@@ -149,8 +149,8 @@ def _tool_torque(c, out):
 
 
 @compiled
-def part_tool_from_arm(c, J_bar):
-    """Split the residual into the tool's share and the arm's; fill `arm_torque`, `arm_torque_trigger` and `alarm`.
+def separate_tool_wrench(c, J_bar):
+    """Split the residual into the tool's share and the arm's; fill `arm_torque`, `arm_torque_fast` and `alarm`.
 
     With a force sensor the tool's wrench is known and taken out already. Without one, a wrench at the tool never shows
     in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force whose line passes far from the tool;
@@ -159,21 +159,21 @@ def part_tool_from_arm(c, J_bar):
     """
     state, J = c.state, c.dynamics.J
     n = state.tau.shape[0]
-    state.alarm[:] = state.residual_trigger
+    state.alarm[:] = state.residual_fast
     if c.state.has_wrench != 0 or c.params.cancel_tool_wrench == 0 or n <= 6:
         state.arm_torque[:] = state.residual
-        state.arm_torque_trigger[:] = state.residual_trigger
+        state.arm_torque_fast[:] = state.residual_fast
         return
     tau_tool = stack_vector(n)
-    wrench = matvec_t_into(J_bar, state.residual_trigger, stack_vector(6))
-    if not passes_elsewhere(wrench, c.params.tool_radius_m, c.params.tool_moment_nm):
+    wrench = matvec_t_into(J_bar, state.residual_fast, stack_vector(6))
+    if not line_of_action_misses_tool(wrench, c.params.tool_radius_m, c.params.tool_moment_nm):
         state.alarm -= matvec_t_into(J, wrench, tau_tool)
     if state.mode == FREE:
         observer_step(state.tool_wrench, state.step.tool_share, wrench)
     matvec_t_into(J, state.tool_wrench, tau_tool)
     for i in range(n):
         state.arm_torque[i] = state.residual[i] - tau_tool[i]
-        state.arm_torque_trigger[i] = state.residual_trigger[i] - tau_tool[i]
+        state.arm_torque_fast[i] = state.residual_fast[i] - tau_tool[i]
 
 
 @compiled
@@ -194,8 +194,8 @@ def set_thresholds(c):
 
 
 @compiled
-def weigh_links(c):
-    """Learn from one joint's residual what the links weigh, while nothing touches the arm; one joint a tick.
+def identify_link_masses(c):
+    """Learn how far the links' masses are from the model's, from one joint's residual a tick, without contact.
 
     Without a force sensor nothing is learned, and with one the tool's weight does not show: what is not known of them
     stays what it was at first.
@@ -213,7 +213,9 @@ def weigh_links(c):
     if told and state.mode == FREE and state.quiet_ticks > 0 and state.ticks > _SETTLE_TICKS:
         error = NOISE_NM + state.unknown[i]
         largest = _SIGMAS * np.sqrt(params.mass_variance)
-        weigh(state.mass_error, state.mass_covariance, row, -state.residual[i], CORRELATED * error * error, largest)
+        identify_masses(
+            state.mass_error, state.mass_covariance, row, -state.residual[i], CORRELATED * error * error, largest
+        )
     state.gravity_sigma[i] = _gravity_sigma(c, i)
 
 

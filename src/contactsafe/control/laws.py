@@ -230,7 +230,7 @@ def observer_step(residual, share, tau_external):
 
 
 @compiled
-def weigh(mass_error, covariance, row, torque, variance, largest):
+def identify_masses(mass_error, covariance, row, torque, variance, largest):
     """Learn in place what the links weigh from one joint's gravity torque: one step of a Kalman filter.
 
     What a link cannot weigh is not believed: a push too faint to be noticed would otherwise be learned as weight.
@@ -252,7 +252,7 @@ def weigh(mass_error, covariance, row, torque, variance, largest):
 
 
 @compiled
-def passes_elsewhere(wrench, radius, margin):
+def line_of_action_misses_tool(wrench, radius, margin):
     """Tell whether a wrench at the tool point cannot come from a touch of the tool: its line passes elsewhere.
 
     Args:

@@ -77,7 +77,7 @@ def power_limit(tau_net, M, qd, tank, power, drain_s):
 
 
 @compiled
-def coming_speed(qd, M_inv, momentum_rate, step_max, dt, speed, ahead):
+def predict_velocity(qd, M_inv, momentum_rate, step_max, dt, speed, ahead):
     """Fill the speed that joints will have before the torque that drives them can be taken off, and when that is.
 
     A command falls by `step_max` a tick at most: until it is gone it goes on accelerating, by half of it on average.
@@ -110,7 +110,7 @@ def joint_excess(q, qd, speed, ahead, q_min, q_max, qd_max, margin, deceleration
 
     Args:
         q, qd: (n,), rad and rad/s.
-        speed: by then, (n,), rad/s; see `coming_speed`.
+        speed: by then, (n,), rad/s; see `predict_velocity`.
         ahead: time until then, (n,), s.
         q_min, q_max: range, (n,), rad.
         qd_max: speed limits, (n,), rad/s.

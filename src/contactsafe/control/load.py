@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from contactsafe.control.estimate import CORRELATED, NOISE_NM, expect_masses
-from contactsafe.control.laws import weigh
+from contactsafe.control.estimate import CORRELATED, NOISE_NM, reset_mass_estimate
+from contactsafe.control.laws import identify_masses
 from contactsafe.control.records import FREE, LOAD
 from contactsafe.control.supervisor import enter
 from contactsafe.core.compiled import compiled
@@ -101,7 +101,7 @@ def payload_momentum_into(load, dynamics, out):
 
 
 @compiled
-def expect_load(state):
+def reset_payload_estimate(state):
     """Begin to weigh anew what the tool carries beyond what is known."""
     state.load[:] = 0.0
     state.load_covariance[:] = 0.0
@@ -130,7 +130,7 @@ def load_regressor_into(c, i, row):
 
 
 @compiled
-def weigh_load(c):
+def identify_payload(c):
     """Learn what the tool carries beyond the model from one joint's torque, while the arm is slow; one joint a tick.
 
     The torque is all that acts from outside, also on the tool: the sum of what the sensor shows and the observer finds.
@@ -155,7 +155,7 @@ def weigh_load(c):
     share = min(state.step.dt / _SMOOTH_S, 1.0)
     state.load_torque += share * ((torque / error) ** 2 - state.load_torque)
     state.load_left += share * ((news / error) ** 2 - state.load_left)
-    weigh(state.load, state.load_covariance, row, news, CORRELATED * error * error, _LARGEST)
+    identify_masses(state.load, state.load_covariance, row, news, CORRELATED * error * error, _LARGEST)
     state.loaded = 1 if _is_load(state, c.payload.mass) else 0
     _watch_sag(c)
 
@@ -170,7 +170,7 @@ def _is_slow(qd):
 
 @compiled
 def _is_load(state, known_kg):
-    """Tell whether what acts on the arm is what a body in the tool would weigh, or one that is no longer there."""
+    """Tell whether what acts on the arm is the weight of a body in the tool, or of one that is gone."""
     mass, moment = state.load[0], state.load[1:]
     if state.load_torque < _TOLD or state.load_left > _LEFT * state.load_torque or mass < -1.2 * known_kg:
         return False
@@ -218,19 +218,19 @@ def take_up(controllers, index, weight):
     share = _there(state.residual, change)
     _move(state.residual, share, change)
     _move(state.observed, share, change)
-    trigger_share = _there(state.residual_trigger, change)
-    _move(state.residual_trigger, trigger_share, change)
-    _move(state.observed_trigger, trigger_share, change)
+    detection_filter_gain = _there(state.residual_fast, change)
+    _move(state.residual_fast, detection_filter_gain, change)
+    _move(state.observed_fast, detection_filter_gain, change)
     payload_weight_into(c.payload, dynamics.rotation, c.handle.gravity, new_weight)
     for k in range(6):
         state.tool_wrench[k] -= share * (new_weight[k] - weight[k])
     if state.has_wrench == 0:
         for k in range(3):
             state.tool_force[k] -= share * (new_weight[k] - weight[k])
-    if trigger_share > 0.5:  # what was a contact was the load; what else there is shows at once
+    if detection_filter_gain > 0.5:  # what was a contact was the load; what else there is shows at once
         enter(state, FREE)
-    expect_masses(c)
-    expect_load(state)
+    reset_mass_estimate(c)
+    reset_payload_estimate(state)
     if state.fault == LOAD:
         state.fault = 0
 

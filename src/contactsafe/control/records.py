@@ -93,19 +93,19 @@ def target_dtype(n: int) -> np.dtype:
             ("quat", _f, (4,)),  # w x y z
             ("K_task", _f, (6,)),  # 1/s²
             ("D_task", _f, (6,)),  # 1/s
-            ("q_pose", _f, (n,)),  # rad
+            ("q_posture", _f, (n,)),  # rad
             ("kept", _i),  # 1 in a tick for which no new one came
         ]
     )
 
 
 _SHARES = (
-    "trigger_share",
-    "observer_share",
-    "lowpass_share",
-    "recover_share",
-    "probe_share",
-    "hold_share",
+    "detection_filter_gain",
+    "compensation_filter_gain",
+    "lowpass_gain",
+    "recover_gain",
+    "probe_gain",
+    "reject_recover_gain",
     "tool_share",
 )
 """Parts of their way that first-order filters go in one tick."""
@@ -136,7 +136,7 @@ def params_dtype(n: int) -> np.dtype:
         ]
         + [(name, _f) for name in _SHARES]
         + [("dwell_ticks", _i), ("release_ticks", _i)]
-        + [(name, _f, (n,)) for name in ("K_pose", "D_pose", "q_min", "q_max", "qd_max", "tau_max")]
+        + [(name, _f, (n,)) for name in ("K_posture", "D_posture", "q_min", "q_max", "qd_max", "tau_max")]
         + [("runaway_speed", _f, (n,)), ("reversal_s", _f, (n,))]
         + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
         + [("friction", _f, (n, 3)), ("mass_variance", _f, (n + 1,))]
@@ -213,16 +213,16 @@ def _estimated(n: int) -> list[tuple]:
         ("impulse", _f, (n,)),  # of the command less friction and β since the last good measurement, N m ticks
         ("impulse_ticks", _f),  # in so many ticks
         ("observed", _f, (n,)),  # residual before its low-pass, compensating observer, N m
-        ("observed_trigger", _f, (n,)),  # the same, triggering observer, N m
+        ("observed_fast", _f, (n,)),  # the same, triggering observer, N m
         ("residual", _f, (n,)),  # N m
-        ("residual_trigger", _f, (n,)),  # N m
+        ("residual_fast", _f, (n,)),  # N m
         ("observed_rate", _f, (n,)),  # momentum's rate of change through the triggering observer's filter, N m
         ("momentum_rate", _f, (n,)),  # the same behind the low-pass, N m
         ("observed_ramp", _f, (n,)),  # change of the command per tick through the triggering observer's filter, N m
         ("torque_ramp", _f, (n,)),  # the same behind the low-pass, N m
         ("tool_wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
         ("arm_torque", _f, (n,)),  # residual less the tool's share, compensating, N m
-        ("arm_torque_trigger", _f, (n,)),  # the same, triggering, N m
+        ("arm_torque_fast", _f, (n,)),  # the same, triggering, N m
         ("alarm", _f, (n,)),  # what is held against the thresholds, N m
         ("threshold", _f, (n,)),  # N m
         ("unknown", _f, (n,)),  # of it, what friction, inertia and a late command may come to, N m
@@ -245,10 +245,10 @@ def _supervised(n: int) -> list[tuple]:
     return [
         ("mode", _i),
         ("mode_ticks", _i),  # ticks spent in the mode
-        ("moved_rad", _f),  # by which the arm has receded along the contact's direction since the reference
-        ("moved_smooth_rad", _f),  # the same, smoothed
+        ("displacement_rad", _f),  # by which the arm has receded along the contact's direction since the reference
+        ("displacement_smooth_rad", _f),  # the same, smoothed
         ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
-        ("judge_rad", _f),  # where it is judged next whether something pushes
+        ("decide_rad", _f),  # where it is judged next whether something pushes
         ("reference_nm", _f),  # contact torque then, N m
         ("hold_nm", _f),  # push limit while holding, N m
         ("hold_s", _f),  # time constant with which it falls, s
@@ -258,11 +258,11 @@ def _supervised(n: int) -> list[tuple]:
         ("contact_link", _i),  # link that the contact is on, 1 … n
         ("lever", _f),  # joint torque per newton there, m
         ("lever_most", _f),  # the same, were the push not along the surface's normal, m
-        ("search_at", _i),  # next point of the skin to be searched
+        ("search_at", _i),  # next point of the surface to be searched
         ("search_point", _i),  # best one of this search so far, −1 for none
         ("search_fit", _f),  # cosine between its torque and the one found
         ("velocity_observed", _f, (n,)),  # joint velocity through the triggering observer's filter, rad/s
-        ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_trigger, rad/s
+        ("velocity_seen", _f, (n,)),  # the same behind the low-pass: in step with residual_fast, rad/s
         ("holding", _i),  # 1 while something pushes the arm
     ]
 
@@ -282,12 +282,12 @@ def _commanded(n: int) -> list[tuple]:
         ("task_damping", _f),  # largest of the task's damping in force, 1/s
         ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
         ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
-        ("damping_share", _f, (n,)),  # of each joint's damping in force
+        ("damping_scale", _f, (n,)),  # of each joint's damping in force
         ("runaway", _i),  # 1 once a joint stayed beyond its speed limit though it was braked, until reset
         ("overspeed_s", _f, (n,)),  # time beyond the speed limit, s
-        ("posture_share", _f),  # of K_pose in force
-        ("share_reason", _i),  # key of LIMITS that took what is missing of it
-        ("task_share", _f),  # of what pulls to the target in force, 0 … 1
+        ("posture_scale", _f),  # of K_posture in force
+        ("scale_reason", _i),  # key of LIMITS that took what is missing of it
+        ("task_scale", _f),  # of what pulls to the target in force, 0 … 1
     ]
 
 
@@ -297,7 +297,7 @@ def output_dtype(n: int) -> np.dtype:
         [
             ("torque", _f, (n,)),  # command, N m
             ("residual", _f, (n,)),  # compensating, N m
-            ("residual_trigger", _f, (n,)),  # N m
+            ("residual_fast", _f, (n,)),  # N m
             ("error", _f, (6,)),  # x_d − x, m and rad
             ("position", _f, (3,)),  # of the tool, m
             ("rotation", _f, (3, 3)),
@@ -336,7 +336,7 @@ def controller_dtype(n: int) -> np.dtype:
 
 def index_bounds(controller) -> dict[str, tuple[float, float]]:
     """Give what those integers of a `controller_dtype` record may be that compiled code uses as an index, by name."""
-    n, points = len(controller["state"]["tau"]), int(controller["handle"]["skin_points"])
+    n, points = len(controller["state"]["tau"]), int(controller["handle"]["surface_points"])
     return {
         "state.turn": (0, n - 1),
         "state.mode": (FREE, CONTACT),
@@ -353,9 +353,9 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     dt = config.dt
     for name in (*_copied(float), *_copied(bool)):
         params[name] = getattr(config, name)
-    params["trigger_share"] = observer_gain(config.trigger_gain, dt)
-    params["observer_share"] = observer_gain(config.observer_gain, dt)
-    params["lowpass_share"] = observer_gain(2.0 * math.pi * config.residual_cutoff_hz, dt)
+    params["detection_filter_gain"] = observer_gain(config.detection_gain, dt)
+    params["compensation_filter_gain"] = observer_gain(config.observer_gain, dt)
+    params["lowpass_gain"] = observer_gain(2.0 * math.pi * config.residual_cutoff_hz, dt)
     mobility = best_mobility(arm)
     params["manipulability_damping"] *= mobility.mean
     # An arm that can never move its tool every way is singular wherever it is.
@@ -367,15 +367,17 @@ def fill_params(params, config: ControllerConfig, arm: Arm) -> None:
     params["torque_step"] = config.torque_rate_fraction * arm.torque_rate_max * dt
     params["dwell_ticks"] = round(config.dwell_s / dt)
     params["release_ticks"] = round(config.release_s / dt)
-    params["recover_share"] = share_per_tick(config.recover_s, dt)
+    params["recover_gain"] = fraction_per_tick(config.recover_s, dt)
     params["posture_in_contact"] = 0.0 if config.recover_s > 0 else 1.0
-    params["probe_share"] = share_per_tick(config.probe_s, dt)
-    params["tool_share"] = share_per_tick(config.tool_memory_s, dt)
+    params["probe_gain"] = fraction_per_tick(config.probe_s, dt)
+    params["tool_share"] = fraction_per_tick(config.tool_memory_s, dt)
     params["mass_variance"] = mass_variance(config, arm)
-    params["hold_share"] = share_per_tick(config.hold_recover_s, dt)
-    params["K_pose"] = _per_joint(config.K_pose, arm.n)
+    params["reject_recover_gain"] = fraction_per_tick(config.reject_recover_s, dt)
+    params["K_posture"] = _per_joint(config.K_posture, arm.n)
     # A spring that acts late drives what it holds, as a damper of −K τ would: put in twice that at least.
-    params["D_pose"] = np.maximum(_per_joint(config.D_pose, arm.n), 2.0 * config.loop_delay_s * params["K_pose"])
+    params["D_posture"] = np.maximum(
+        _per_joint(config.D_posture, arm.n), 2.0 * config.loop_delay_s * params["K_posture"]
+    )
     params["damping_rate"] = damping_rate(config, GAIN_MARGIN)
     params["braking_rate"] = damping_rate(config, BRAKING_MARGIN)
     # Where the stops of a narrow range would overlap, they begin later: half of it stays free.
@@ -397,7 +399,7 @@ def _speed_gained(arm: Arm) -> np.ndarray:
     return np.minimum(np.sqrt(4.0 * math.pi * arm.tau_max * np.diag(M_inv)), 1e5)
 
 
-def share_per_tick(time_constant_s: float, dt: float) -> float:
+def fraction_per_tick(time_constant_s: float, dt: float) -> float:
     """Give the share of its way that a first-order filter goes in one tick; all of it where its time constant is 0."""
     return 1.0 - math.exp(-dt / time_constant_s) if time_constant_s > 0 else 1.0
 

@@ -2,7 +2,7 @@
 
 import math
 
-from contactsafe.control.braking import brake_into, braking_share
+from contactsafe.control.braking import brake_into, braking_fraction
 from contactsafe.control.clock import (
     BRIDGE_TICKS,
     all_usable,
@@ -16,16 +16,16 @@ from contactsafe.control.damping import (
     braking_limit,
     joint_damping_limits,
     loosen_limits,
-    share_damping,
+    scale_damping_into,
     task_damping_into,
 )
 from contactsafe.control.estimate import (
     correct_gravity,
+    identify_link_masses,
     observe,
-    part_tool_from_arm,
+    separate_tool_wrench,
     set_thresholds,
     start,
-    weigh_links,
 )
 from contactsafe.control.laws import (
     contact_nullspace,
@@ -39,15 +39,15 @@ from contactsafe.control.laws import (
     tool_share,
 )
 from contactsafe.control.limits import (
-    coming_speed,
     joint_excess,
     joint_stop_gains,
     joint_stop_torque,
     limit_torque,
     passive_step,
     power_limit,
+    predict_velocity,
 )
-from contactsafe.control.load import expect_load, take_off_payload, weigh_load
+from contactsafe.control.load import identify_payload, reset_payload_estimate, take_off_payload
 from contactsafe.control.records import (
     BAD_GAIN,
     BAD_MEASUREMENT,
@@ -96,7 +96,7 @@ def control_tick(c):
     correct_gravity(c)
     if state.started == 0:
         start(c)
-        expect_load(state)
+        reset_payload_estimate(state)
     stop_late_target(c)
     Lambda, J_M_inv = task_inertia(
         c.dynamics.J, c.dynamics.M_inv, c.params.manipulability_floor, c.params.manipulability_damping
@@ -106,10 +106,10 @@ def control_tick(c):
     observe(c)
     if state.bridged == 0:
         set_thresholds(c)
-        part_tool_from_arm(c, J_bar)
+        separate_tool_wrench(c, J_bar)
         supervise(c)
-        weigh_links(c)
-        weigh_load(c)
+        identify_link_masses(c)
+        identify_payload(c)
         state.turn = (state.turn + 1) % state.tau.shape[0]
         _watch_speed(c)
         state.since = 0.0
@@ -148,7 +148,7 @@ def _wait(c):
 
 @compiled
 def _target_fault(target, params):
-    usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_pose)
+    usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_posture)
     if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
         return BAD_TARGET
     if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
@@ -176,7 +176,7 @@ def _accept_target(c):
     held.position[:] = c.target.position
     held.K_task[:] = c.target.K_task
     held.D_task[:] = c.target.D_task
-    held.q_pose[:] = c.target.q_pose
+    held.q_posture[:] = c.target.q_posture
 
 
 @compiled
@@ -213,7 +213,9 @@ def _law(c, Lambda, J_bar):
     )
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     c.output.error[:] = error
-    F_spring = stiffness_wrench(Lambda, error, state.K_task, params.pull_max_m_s2, params.pull_max_rad_s2)
+    F_spring = stiffness_wrench(
+        Lambda, error, state.K_task, params.task_acceleration_max_m_s2, params.task_acceleration_max_rad_s2
+    )
     D_task = task_damping_into(state.K_task, state.D_task, params.loop_delay_s, stack_vector(6))
     F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
     _limit_damping(c, D_task.max())
@@ -224,13 +226,13 @@ def _law(c, Lambda, J_bar):
     of_task, of_posture = stack_vector(n), stack_vector(n)
     pull = matvec_t_into(dynamics.J, F_spring, of_task) + matvec_t_into(N_ct, tau_spring, of_posture)
     damping = matvec_t_into(dynamics.J, F_damping, of_task) + matvec_t_into(N_ct, tau_damping, of_posture)
-    observer_step(state.tool_force, state.step.probe_share, _tool_force_into(c, J_bar, stack_vector(6)))
-    share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.push_tool_n)
+    observer_step(state.tool_force, state.step.probe_gain, _tool_force_into(c, J_bar, stack_vector(6)))
+    share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.tool_force_limit_n)
     reason = LIMITED_BY_TOOL_FORCE if share < 1.0 else 0
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
-        _follow_share(state, params, share, reason)
-        tau = state.task_share * pull + damping + state.unweighed
+        _follow_scale(state, params, share, reason)
+        tau = state.task_scale * pull + damping + state.unweighed
     else:
         F_arm = matvec_t_into(J_bar, state.arm_torque, stack_vector(6))
         disturbance = matvec_t_into(dynamics.J, F_arm, of_task)
@@ -244,15 +246,15 @@ def _limit_damping(c, D_task):
     state, params = c.state, c.params
     state.task_damping = D_task
     joint_damping_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
-    state.joint_damping[:] = params.D_pose
+    state.joint_damping[:] = params.D_posture
     if state.mode != FREE:
         for i in range(state.joint_damping.shape[0]):
-            state.joint_damping[i] = max(params.D_pose[i], params.null_damping) + params.contact_damping
+            state.joint_damping[i] = max(params.D_posture[i], params.null_damping) + params.contact_damping
     if (state.joint_damping > state.damping_limit).any():
         loosen_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
-    share_damping(state.joint_damping, state.damping_limit, state.damping_share)
+    scale_damping_into(state.joint_damping, state.damping_limit, state.damping_scale)
     for i in range(state.joint_damping.shape[0]):
-        state.joint_damping[i] *= state.damping_share[i]
+        state.joint_damping[i] *= state.damping_scale[i]
 
 
 @compiled
@@ -261,11 +263,11 @@ def _posture_into(c, tau_spring, tau_damping):
     state, params = c.state, c.params
     _follow_posture(state, params)
     for i in range(tau_spring.shape[0]):
-        tau_spring[i] = state.target.q_pose[i] - state.q[i]
+        tau_spring[i] = state.target.q_posture[i] - state.q[i]
     shorten(tau_spring, params.posture_error_max_rad)
     for i in range(tau_spring.shape[0]):
-        D = state.damping_share[i] * params.D_pose[i]
-        tau_spring[i] *= state.posture_share * min(params.K_pose[i], D / (2.0 * params.loop_delay_s))
+        D = state.damping_scale[i] * params.D_posture[i]
+        tau_spring[i] *= state.posture_scale * min(params.K_posture[i], D / (2.0 * params.loop_delay_s))
         tau_damping[i] = -D * state.qd[i]
 
 
@@ -275,29 +277,29 @@ def _tool_force_into(c, J_bar, wrench):
     if c.state.has_wrench != 0:
         wrench[:] = c.state.wrench_ee
     else:
-        matvec_t_into(J_bar, c.state.residual_trigger, wrench)
+        matvec_t_into(J_bar, c.state.residual_fast, wrench)
     return wrench[:3]
 
 
 @compiled
-def _follow_share(state, params, wanted, reason):
+def _follow_scale(state, params, wanted, reason):
     """Let the task's share fall at once and come back slowly, fast where something pushes the arm; say what took it."""
-    if wanted < state.task_share:
-        state.task_share, state.share_reason = wanted, reason
+    if wanted < state.task_scale:
+        state.task_scale, state.scale_reason = wanted, reason
     else:
-        back = state.step.recover_share if state.holding == 0 else state.step.hold_share
-        state.task_share += back * (wanted - state.task_share)
-    if state.task_share > _WHOLE:
-        state.share_reason = reason
+        back = state.step.recover_gain if state.holding == 0 else state.step.reject_recover_gain
+        state.task_scale += back * (wanted - state.task_scale)
+    if state.task_scale > _WHOLE:
+        state.scale_reason = reason
 
 
 @compiled
 def _follow_posture(state, params):
     """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
     if state.mode == FREE:
-        state.posture_share += state.step.recover_share * (1.0 - state.posture_share)
+        state.posture_scale += state.step.recover_gain * (1.0 - state.posture_scale)
     else:
-        state.posture_share = params.posture_in_contact
+        state.posture_scale = params.posture_in_contact
 
 
 @compiled
@@ -314,11 +316,11 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
     n = qd.shape[0]
     shared, in_null = stack_vector(n), stack_vector(n)
     for i in range(n):
-        shared[i] = state.damping_share[i] * qd[i]
+        shared[i] = state.damping_scale[i] * qd[i]
     matvec_t_into(removed, shared, in_null)
     for i in range(n):
         damping[i] -= params.null_damping * in_null[i]
-        damping[i] -= params.contact_damping * state.damping_share[i] * qd[i]
+        damping[i] -= params.contact_damping * state.damping_scale[i] * qd[i]
     compensation = -task_disturbance
     push = push_along(direction, M_inv, compensation)
     if push > limit:
@@ -327,8 +329,8 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
     pull_push = push_along(direction, M_inv, pull)
     if pull_push > 0.0 and left / pull_push < share:
         share, reason = left / pull_push, LIMITED_BY_CONTACT
-    _follow_share(state, params, share, reason)
-    tau = state.task_share * pull + compensation + damping + state.unweighed
+    _follow_scale(state, params, share, reason)
+    tau = state.task_scale * pull + compensation + damping + state.unweighed
     c.output.push_nm, c.output.push_limit_nm = push + pull_push, limit
     push = push_along(direction, M_inv, tau)
     if push > limit:
@@ -346,9 +348,11 @@ def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
 def _push_limit(c):
     """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
     params, state = c.params, c.state
-    gentle = min(params.push_yield_nm, params.push_yield_n * state.lever)
-    firm = max(state.meet_n * state.lever_most, min(state.hold_nm, params.push_hold_n * state.lever_most))
-    return max(gentle, min(firm, params.push_hold_nm))
+    gentle = min(params.contact_torque_limit_comply_nm, params.contact_force_limit_comply_n * state.lever)
+    firm = max(
+        state.meet_n * state.lever_most, min(state.hold_nm, params.contact_force_limit_reject_n * state.lever_most)
+    )
+    return max(gentle, min(firm, params.contact_torque_limit_reject_nm))
 
 
 @compiled
@@ -390,7 +394,7 @@ def _slow_down(c, tau, speed):
     state, dynamics, params = c.state, c.dynamics, c.params
     share = 1.0
     if state.runaway == 0:
-        share = braking_share(state.qd, speed, dynamics.c, params.runaway_speed, params.tau_max)
+        share = braking_fraction(state.qd, speed, dynamics.c, params.runaway_speed, params.tau_max)
     if share == 0.0:
         return False
     brake, torque_rate = stack_vector(tau.shape[0]), params.torque_step / params.dt
@@ -406,14 +410,14 @@ def _finish(c, tau):
     state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
     qd, step = state.qd, state.step
     _refuse_unusable(state, tau)
-    limited_by = state.share_reason if state.task_share < 1.0 else 0
-    if state.loaded != 0 and state.task_share < _WHOLE:
+    limited_by = state.scale_reason if state.task_scale < 1.0 else 0
+    if state.loaded != 0 and state.task_scale < _WHOLE:
         limited_by |= LIMITED_BY_LOAD
     # Joints are stopped from what the motors can do, not from what is wanted of them.
     clipped = limit_torque(tau, state.tau, params.tau_max, math.inf, dynamics.M_inv)
     tau -= dynamics.g + dynamics.c
     dt, speed, ahead = max(step.dt, params.dt), stack_vector(tau.shape[0]), stack_vector(tau.shape[0])
-    coming_speed(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt, speed, ahead)
+    predict_velocity(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt, speed, ahead)
     if _stop_joints(c, tau, speed, ahead):
         limited_by |= LIMITED_BY_RANGE
     tau += dynamics.c
@@ -433,7 +437,7 @@ def _finish(c, tau):
     state.tank_j = min(state.tank_j + step.dt * (params.tank_power_w - given), params.tank_j)
     out.torque[:] = tau
     out.residual[:] = state.residual
-    out.residual_trigger[:] = state.residual_trigger
+    out.residual_fast[:] = state.residual_fast
     out.position[:] = dynamics.position
     out.rotation[:] = dynamics.rotation
     out.velocity[:] = dynamics.velocity

@@ -29,7 +29,8 @@ from numba.core import caching, event
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
-_ROOMS = ("robot", "control", "sim", "envs")  # where compiled functions call each other across files
+_ROOMS = ("core", "robot", "vision", "control", "sim", "policy", "tasks", "envs")
+"""Where compiled functions call each other across files."""
 
 _PREFIX = "contactsafe-compiled-"
 _NAME = re.compile(rf"{_PREFIX}[0-9a-f]{{16}}(-\w+)?")
@@ -47,8 +48,8 @@ _HANDED_DOWN = "CONTACTSAFE_PRIVATE_CACHE"
 def _digest() -> str:
     """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy."""
     fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
-    root = pathlib.Path(__file__).parent
-    for path in [root / "compiled.py", *(path for room in _ROOMS for path in sorted((root / room).rglob("*.py")))]:
+    root = pathlib.Path(__file__).parents[1]
+    for path in (path for room in _ROOMS for path in sorted((root / room).rglob("*.py"))):
         fingerprint.update(path.read_bytes())
     return fingerprint.hexdigest()[:16]
 

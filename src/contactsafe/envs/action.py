@@ -93,10 +93,10 @@ def apply_action(c, limits, rule, action):
         tool = c.output.position[i]
         target.position[i] = min(max(target.position[i], tool - limits.lead[0]), tool + limits.lead[0])
     target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
-    q_pose = np.empty(target.q_pose.shape[0])
-    error, rotation_error = find_posture(rule, target.position, target.quat, q_pose)
+    q_posture = np.empty(target.q_posture.shape[0])
+    error, rotation_error = find_posture(rule, target.position, target.quat, q_posture)
     if error <= POSITION_TOLERANCE and rotation_error <= ROTATION_TOLERANCE:
-        target.q_pose[:] = q_pose
+        target.q_posture[:] = q_posture
 
 
 @compiled

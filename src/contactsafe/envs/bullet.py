@@ -22,7 +22,7 @@ class BulletTasks(WipingTasks):
         worlds.enter_changed()
         worlds.run(ticks, traces if traces.shape[1] else None)
         _judge(
-            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, worlds.ledger,
+            worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.cameras, worlds.ink_index,
             self._rewards[0], self.tasks, worlds.masks,
         )  # fmt: skip
         worlds.in_threads(self._look)
@@ -35,9 +35,9 @@ def _apply(controllers, limits, rule, actions):
 
 
 @compiled(nogil=True)
-def _judge(plants, controllers, cells, reports, cameras, ledger, rewards, tasks, masks):
+def _judge(plants, controllers, cells, reports, cameras, ink_index, rewards, tasks, masks):
     for i in range(tasks.shape[0]):
-        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ledger, rewards, tasks[i], masks[i])
+        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ink_index, rewards, tasks[i], masks[i])
 
 
 class WipingBulletEnv(WipingEnv):

@@ -91,7 +91,7 @@ class WipingConfig:
     Attributes:
         episode_s: time limit, s.
         controller: preset by name; the free-space law is 'vices'.
-        clean_share: share of the ink below which the board counts as clean.
+        clean_fraction: share of the ink below which the board counts as clean.
         start_reach: the tool starts within this of the board's centre along x and y, m.
         start_height: range of the tool's height above the board at the start, m.
         boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
@@ -107,7 +107,7 @@ class WipingConfig:
 
     episode_s: float = 20.0
     controller: str = "safe"
-    clean_share: float = 0.002
+    clean_fraction: float = 0.002
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"

@@ -8,7 +8,7 @@ from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import WipingTasks
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.camera import render_mask
-from contactsafe.sim.drawings import draw_board
+from contactsafe.sim.drawings import paint_board
 from contactsafe.sim.whiteboard import INK, erase_under_pad
 
 _RAISED = 0.35  # m above the board: the arm is out of the camera's view of it
@@ -50,19 +50,19 @@ class MaskSampler(Independent):
     def _draw(self, rng: np.random.Generator, mask: np.ndarray) -> np.ndarray:
         worlds = self._tasks.worlds
         board = worlds.boards[0]
-        self._draw_board(rng)
+        self._paint_board(rng)
         tool = self._place_tool(rng)
         if rng.uniform() < 0.5 and tool[2] < board.config.centre[2] + 0.02:
             self._erase(tool)
         render_mask(worlds.camera, worlds.cells[0], worlds.plants[0], mask)
         return tool
 
-    def _draw_board(self, rng: np.random.Generator) -> None:
+    def _paint_board(self, rng: np.random.Generator) -> None:
         """Draw and wipe until there is something to see, mostly."""
         board = self._tasks.worlds.boards[0]
         while True:
             board.clear()
-            draw_board(board, self._tasks.config.boards, rng)
+            paint_board(board, self._tasks.config.boards, rng)
             self._wipe(rng, left=rng.uniform())
             if board.ink_cells > 0 or rng.uniform() < _SHARE_BLANK:
                 return

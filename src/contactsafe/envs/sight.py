@@ -8,7 +8,7 @@ from contactsafe.sim.world import Worlds
 from contactsafe.vision.segment import Segmenter
 
 
-class PhotographSight(Independent):
+class PhotographSource(Independent):
     """Cameras over the boards of some worlds, and what finds the ink in their pictures.
 
     It keeps no state: light, pen and camera of an episode follow from `light` of its `task_dtype` record, the noise of

@@ -4,8 +4,8 @@ import numpy as np
 
 from contactsafe.core.compiled import compiled
 from contactsafe.envs.action import apply_action, observed_pose, observed_target
-from contactsafe.sim.camera import camera_at, draw_mask
-from contactsafe.sim.ink import nearest_ink, strike_out
+from contactsafe.sim.camera import camera_at, render_mask_into
+from contactsafe.sim.ink import nearest_ink, remove_erased
 from contactsafe.sim.stepping import run_ticks, tool_position
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
@@ -32,7 +32,7 @@ task_dtype = np.dtype(
 )
 """What the task knows of one world."""
 
-rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_share")])
+rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_fraction")])
 
 
 @compiled
@@ -43,7 +43,7 @@ def score(task, report, rewards, ink, distance):
     cannot be earned in circles; `contact` is less than `time` takes.
     """
     wiped = task.ink - ink
-    task.clean = 1 if ink <= rewards.clean_share * task.ink_start else 0
+    task.clean = 1 if ink <= rewards.clean_fraction * task.ink_start else 0
     task.arm_touched = report.arm_touched
     task.force_mean, task.force_peak = report.tool_force_mean, report.tool_force_peak
     touching = report.contact_ticks > 0 and report.tool_force_peak < rewards.force_limit_n
@@ -60,25 +60,25 @@ def score(task, report, rewards, ink, distance):
 
 @compiled(nogil=True)
 def step_tasks(
-    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, ledger, limits, rule,
+    start, stop, plants, controllers, cells, noise, ticks, reports, traces, cameras, ink_index, limits, rule,
     actions, rewards, tasks, masks,
 ):  # fmt: skip
     """Run one policy step of each task from start to stop; the arrays are those of `Worlds` and `WipingTasks`."""
     for i in range(start, stop):
         apply_action(controllers[i], limits, rule, actions[i])
         run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
-        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ledger, rewards, tasks[i], masks[i])
+        judge(i, plants[i], controllers[i], cells[i], reports[i], cameras, ink_index, rewards, tasks[i], masks[i])
 
 
 @compiled
-def judge(i, plant, controller, cells, report, cameras, ledger, rewards, task, mask):
-    """Score the step that world i has run and look at it; `ledger` is that of all worlds, the rest is this one's."""
+def judge(i, plant, controller, cells, report, cameras, ink_index, rewards, task, mask):
+    """Score the step that world i has run and look at it; `ink_index` is that of all worlds, the rest is this one's."""
     camera = camera_at(cameras, plant.camera)
-    strike_out(ledger, i, cells, camera.pixels)
-    ink, distance = nearest_ink(ledger, i, cells, plant.origin, plant.cell, tool_position(plant))
+    remove_erased(ink_index, i, cells, camera.pixels)
+    ink, distance = nearest_ink(ink_index, i, cells, plant.origin, plant.cell, tool_position(plant))
     score(task, report, rewards, ink, distance)
     task.steps += 1
-    observe(plant, controller, camera, ledger.shown[i], task, mask)
+    observe(plant, controller, camera, ink_index.shown[i], task, mask)
 
 
 @compiled
@@ -87,4 +87,4 @@ def observe(plant, controller, camera, shown, task, mask):
     observed_pose(controller, task.pose)
     observed_target(controller, task.pose, task.target)
     task.force[:] = controller.state.tool_force
-    draw_mask(camera, shown, plant, mask)
+    render_mask_into(camera, shown, plant, mask)

@@ -20,7 +20,7 @@ from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
 from contactsafe.sim.camera import camera_at
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.drawings import draw_board
+from contactsafe.sim.drawings import paint_board
 from contactsafe.sim.ink import nearest_ink
 from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
 from contactsafe.sim.variation import Variation
@@ -36,9 +36,9 @@ def _sight(config: WipingConfig, worlds: Worlds):
     """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
     if config.sight == "mask":
         return None
-    from contactsafe.envs.sight import PhotographSight
+    from contactsafe.envs.sight import PhotographSource
 
-    return PhotographSight(worlds)
+    return PhotographSource(worlds)
 
 
 def _checked(config: WipingConfig | None) -> WipingConfig:
@@ -98,7 +98,7 @@ class WipingTasks(Independent):
         self._rewards = np.zeros(1, dtype=rewards_dtype)
         for name in (*REWARD_TERMS, "force_limit_n", "gentle_n"):
             self._rewards[name] = getattr(self.config.reward, name)
-        self._rewards["clean_share"] = self.config.clean_share
+        self._rewards["clean_fraction"] = self.config.clean_fraction
         self._actions = np.zeros((n, ACTION_SIZE))
         self._ik = InverseKinematics(self.arm)
         self._rule = posture_rule(self.arm)
@@ -117,7 +117,7 @@ class WipingTasks(Independent):
         board = worlds.boards[i]
         board.clear()
         if drawing is None:
-            draw_board(board, config.boards, rng)
+            paint_board(board, config.boards, rng)
         else:
             board.draw(drawing)
         if start is None:
@@ -140,7 +140,7 @@ class WipingTasks(Independent):
         plant = worlds.plants[i]
         worlds.enter_ink(i)
         ink, distance = nearest_ink(
-            worlds.ledger, i, worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"]
+            worlds.ink_index, i, worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"]
         )
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
@@ -155,7 +155,7 @@ class WipingTasks(Independent):
     def _look_first(self, i: int) -> None:
         worlds, task = self.worlds, self.tasks[i]
         camera = camera_at(worlds.cameras, worlds.plants[i]["camera"])
-        observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ledger.shown[i], task, worlds.masks[i])
+        observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ink_index.shown[i], task, worlds.masks[i])
         if self._sight is not None:
             self._sight.look(i, i + 1, self.tasks)
         if self._variation is not None:
@@ -206,10 +206,10 @@ class WipingTasks(Independent):
         worlds.enter_changed()
 
         def share(start: int, stop: int) -> None:
-            noise = worlds.draw_noise(start, stop)
+            noise = worlds.sample_noise(start, stop)
             step_tasks(
                 start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
-                worlds.cameras, worlds.ledger, self._limits, self._rule, self._actions, self._rewards[0],
+                worlds.cameras, worlds.ink_index, self._limits, self._rule, self._actions, self._rewards[0],
                 self.tasks, worlds.masks,
             )  # fmt: skip
             self._look(start, stop)

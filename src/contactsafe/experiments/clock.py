@@ -9,7 +9,7 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
-from contactsafe.experiments.collision_scenes import Motion, draw_meetings, draw_motion, scene_rng
+from contactsafe.experiments.collision_scenes import Motion, sample_meetings, sample_motion, scene_rng
 from contactsafe.experiments.collisions import CONTACT_N
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.late_worlds import (
@@ -160,7 +160,7 @@ def draw_scene(arm: Arm, situation: str, seed: int) -> Scene:
         "in contact": lambda motion: not motion.holds,
     }[situation]
     number = 1000 * seed
-    while not fits(motion := draw_motion(arm, number)):
+    while not fits(motion := sample_motion(arm, number)):
         number += 1
     at = round(1000 * motion.meets_s)
     if situation != "in contact":
@@ -168,7 +168,7 @@ def draw_scene(arm: Arm, situation: str, seed: int) -> Scene:
     worlds = Worlds(arm, motion.world((), True), presets.vices(), 1, [seed])
     free = record(worlds, [motion])[0]
     worlds.close()
-    met = tuple(meeting.obstacle for meeting in draw_meetings(arm, motion, free["q"]))
+    met = tuple(meeting.obstacle for meeting in sample_meetings(arm, motion, free["q"]))
     return Scene(motion, met, seed, at + round(1000 * _CONTACT_S))
 
 

@@ -15,7 +15,7 @@ from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.envs.action import DOWN
 from contactsafe.learning.evaluation import HELD_OUT_SEED
 from contactsafe.robot.arm import Arm, Pose
-from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.shape import arm_capsules, link_frames
 from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
@@ -116,7 +116,7 @@ def scene_rng(seed: int, part: int) -> np.random.Generator:
     return np.random.default_rng([HELD_OUT_SEED, seed, part])
 
 
-def draw_plant(rng: np.random.Generator, n: int) -> PlantConfig:
+def sample_plant(rng: np.random.Generator, n: int) -> PlantConfig:
     """Draw a plant that differs from its model: friction ± 20 % a joint, inertia ± 10 % a link, payload ± 0.2 kg."""
     return PlantConfig(
         friction_scale=tuple(rng.uniform(0.8, 1.2, n).tolist()),
@@ -126,23 +126,23 @@ def draw_plant(rng: np.random.Generator, n: int) -> PlantConfig:
     )
 
 
-def draw_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
+def sample_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
     """Draw what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or wiping."""
     rng, board = scene_rng(seed, 0), board or BoardConfig()
     wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
     speed = rng.uniform(0.1, 0.3 if wiping else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)
-    plant = draw_plant(rng, arm.n)
+    plant = sample_plant(rng, arm.n)
     while True:
-        pose = _draw_pose(rng, wiping, board)
-        way = np.zeros(3) if holds else _draw_way(rng, wiping)
+        pose = _sample_pose(rng, wiping, board)
+        way = np.zeros(3) if holds else _sample_path(rng, wiping)
         postures = _reachable(arm, pose, way, wiping, rng)
         if postures is not None:
             return Motion(seed, wiping, pose, way, speed, limited, stiffness, postures, meets_at, plant)
 
 
-def _draw_pose(rng: np.random.Generator, wiping: bool, board: BoardConfig) -> Pose:
+def _sample_pose(rng: np.random.Generator, wiping: bool, board: BoardConfig) -> Pose:
     x, y, z = board.centre
     if wiping:
         position = np.array([x + rng.uniform(-0.15, 0.15), y + rng.uniform(-0.2, 0.2), z - _PRESS_M])
@@ -151,7 +151,7 @@ def _draw_pose(rng: np.random.Generator, wiping: bool, board: BoardConfig) -> Po
     return Pose(position, quat_multiply(rotvec_to_quat(rng.uniform(-0.4, 0.4, 3)), DOWN))
 
 
-def _draw_way(rng: np.random.Generator, wiping: bool) -> np.ndarray:
+def _sample_path(rng: np.random.Generator, wiping: bool) -> np.ndarray:
     direction = rng.standard_normal(3)
     if wiping:
         direction[2] = 0.0
@@ -176,11 +176,11 @@ def _reachable(arm: Arm, pose: Pose, way, wiping: bool, rng) -> np.ndarray | Non
     return q_start
 
 
-def draw_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeting, ...]:
+def sample_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeting, ...]:
     """Place one obstacle, or for a quarter of the scenes two, on the surface of the arm as it will move.
 
     Args:
-        arm: built from facts.
+        arm: built from a description.
         motion: what the tool does.
         q_free: joint positions while it does so and nothing is in the way, one row a ms, (T, n), rad.
     """
@@ -188,21 +188,21 @@ def draw_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeting
     meetings: list[Meeting] = []
     wanted = 2 if rng.random() < 0.25 else 1
     while len(meetings) < wanted:
-        meeting = _draw_meeting(arm, motion, q_free, rng)
+        meeting = _sample_meeting(arm, motion, q_free, rng)
         if meeting is not None and all(meeting.link != other.link for other in meetings):
             meetings.append(meeting)
     return tuple(meetings)
 
 
-def _draw_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.Generator) -> Meeting | None:
+def _sample_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.Generator) -> Meeting | None:
     link = int(rng.choice(LINKS))
     radius = rng.uniform(0.02, 0.06)
-    thing = draw_thing(rng, radius, may_be_fixed=not motion.holds)
+    thing = sample_obstacle(rng, radius, may_be_fixed=not motion.holds)
     speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(2.0, 10.0)
     when = len(q_free) - 1 if motion.holds else min(round(1000 * motion.meets_s), len(q_free) - 1)
-    point, normal = draw_surface_point(arm, link, rng)
-    facts, _ = facts_and_tool(arm)
-    frames = [link_frames(facts, q_free[[t]]) for t in (when - 20, when)]
+    point, normal = sample_surface_point(arm, link, rng)
+    description, _ = description_and_tool(arm)
+    frames = [link_frames(description, q_free[[t]]) for t in (when - 20, when)]
     before, at = ((o[0, link] + R[0, link] @ point) for o, R in frames)
     normal = frames[1][1][0, link] @ normal
     centre = at + (radius + _CLEAR_M) * normal
@@ -234,30 +234,30 @@ def _touching(arm: Arm, q: np.ndarray, at: np.ndarray, normal: np.ndarray, radiu
     return at + far * normal
 
 
-def draw_thing(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> Obstacle:
+def sample_obstacle(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> Obstacle:
     """Draw a sphere of 0.5 to 5 kg on springs, log-uniform 1 to 75 kN/m, or (one in eight) a fixed one."""
     stiffness = math.exp(rng.uniform(math.log(1e3), math.log(75e3)))
     mass, fixed = math.exp(rng.uniform(math.log(0.5), math.log(5.0))), rng.random() < 0.125
     return Obstacle((0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S)
 
 
-def facts_and_tool(arm: Arm) -> tuple[ArmFacts, Tool]:
+def description_and_tool(arm: Arm) -> tuple[ArmDescription, Tool]:
     """Give what an arm was built from.
 
     Raises:
-        InvalidInputError: it was not built from facts.
+        InvalidInputError: it was not built from a description.
     """
-    if arm.facts is None or arm.tool is None:
+    if arm.description is None or arm.tool is None:
         raise InvalidInputError(
-            f"arm '{arm.name}' has no facts to know its surface by; give contactsafe.robots.panda()"
+            f"arm '{arm.name}' has no description to know its surface by; give contactsafe.robots.panda()"
         )
-    return arm.facts, arm.tool
+    return arm.description, arm.tool
 
 
-def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
-    facts, tool = facts_and_tool(arm)
-    capsules = tool.capsules if link > arm.n else facts.links[link - 1].capsules
+    description, tool = description_and_tool(arm)
+    capsules = tool.capsules if link > arm.n else description.links[link - 1].capsules
     capsule = capsules[rng.integers(len(capsules))]
     start, end = np.array(capsule.start), np.array(capsule.end)
     normal = rng.standard_normal(3)
@@ -275,7 +275,7 @@ def draw_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[n
 
 def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
     """Give the least distance of a point from the arm's capsules over postures q (T, n), m."""
-    starts, ends, radii, _ = arm_capsules(*facts_and_tool(arm), q)
+    starts, ends, radii, _ = arm_capsules(*description_and_tool(arm), q)
     along = ends - starts
     share = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
     nearest = starts + np.clip(share, 0.0, 1.0)[..., None] * along

@@ -9,7 +9,7 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import Meeting, Motion, draw_meetings, draw_motion
+from contactsafe.experiments.collision_scenes import Meeting, Motion, sample_meetings, sample_motion
 from contactsafe.experiments.config import BATCH, PLANTS, ExperimentConfig
 from contactsafe.experiments.motions import record
 from contactsafe.experiments.results import Experiment, Recording, Trial
@@ -123,19 +123,19 @@ class _Batch:
     """Scenes stepped side by side.
 
     Args:
-        arm: built from facts.
+        arm: built from a description.
         seeds: of the scenes.
     """
 
     def __init__(self, arm: Arm, seeds: Sequence[int]):
         self.arm, self.seeds = arm, seeds
-        self.motions = [draw_motion(arm, seed) for seed in seeds]
+        self.motions = [sample_motion(arm, seed) for seed in seeds]
         nothing: list[tuple[Meeting, ...]] = [()] * len(seeds)
         worlds = self._worlds(nothing, presets.vices(), "real")
         self.free = record(worlds, self.motions)
         worlds.close()
         self.meetings = [
-            draw_meetings(arm, motion, trace["q"]) for motion, trace in zip(self.motions, self.free, strict=True)
+            sample_meetings(arm, motion, trace["q"]) for motion, trace in zip(self.motions, self.free, strict=True)
         ]
 
     def run(self, controllers: Mapping[str, ControllerConfig], plant: str):
@@ -221,8 +221,8 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
         "tool_error_mm": float(1000.0 * away.max()),
         "tool_error_end_mm": float(1000.0 * away[-1]),
         "tool_force_peak_n": float(np.linalg.norm(trace["tool_force"], axis=1).max()),
-        "yielding_share": float((contact & (trace["holding"] == 0)).mean()),
-        "holding_share": float((contact & (trace["holding"] == 1)).mean()),
+        "comply_fraction": float((contact & (trace["holding"] == 0)).mean()),
+        "reject_fraction": float((contact & (trace["holding"] == 1)).mean()),
         "mode_switches": float(np.count_nonzero(np.diff(trace["mode"]))),
         "limit_touches": float(np.count_nonzero(np.diff(at_limit.astype(int)) > 0)),
     }

@@ -12,9 +12,9 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import (
     Motion,
     clearance,
-    draw_motion,
-    draw_surface_point,
-    facts_and_tool,
+    description_and_tool,
+    sample_motion,
+    sample_surface_point,
     scene_rng,
 )
 from contactsafe.experiments.config import ExperimentConfig
@@ -69,7 +69,7 @@ def detection(bundle, config: ExperimentConfig, progress: Progress | None = None
                 trials += push_trials(arm, name, controller, seeds[first : first + _BATCH], scenario)
                 if progress:
                     progress(len(seeds[first : first + _BATCH]))
-        strokes = draw_strokes(arm, config.seed, _stroke_worlds(config.minutes))
+        strokes = paint_strokes(arm, config.seed, _stroke_worlds(config.minutes))
         for first in range(0, len(strokes), _BATCH):
             trials += alarm_trials(arm, name, controller, strokes[first : first + _BATCH])
             if progress:
@@ -119,22 +119,22 @@ class Push:
     torque: np.ndarray
 
 
-def draw_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str) -> Push:
+def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str) -> Push:
     """Draw a push on a point of the arm that nothing of the arm covers.
 
     A step has the force that makes its largest joint torque `STEP_NM`; points that would take more than 100 N for it
     are drawn anew. A contact has any point, and a force of `FORCE_N`, log-uniform.
 
     Args:
-        arm: built from facts.
+        arm: built from a description.
         q: its joint positions, (n,), rad.
         rng: of the draw.
         scenario: `STEP` or `CONTACT`.
     """
-    origins, rotations = link_frames(facts_and_tool(arm)[0], q[None])
+    origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
     while True:
         link = int(rng.choice(LINKS))
-        point, normal = draw_surface_point(arm, link, rng)
+        point, normal = sample_surface_point(arm, link, rng)
         size = math.exp(rng.uniform(*np.log(FORCE_N)))
         place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal
         if clearance(arm, q[None], place - 1e-3 * inwards) < 0.5e-3:
@@ -167,13 +167,13 @@ def push_trials(arm: Arm, name: str, controller: ControllerConfig, seeds: Sequen
     """Push the arm once in each scene, while it moves, and see when and where a contact is reported.
 
     Args:
-        arm: built from facts.
+        arm: built from a description.
         name: of the controller.
         controller: that reports contacts.
         seeds: of the scenes.
         scenario: `STEP` or `CONTACT`.
     """
-    motions = [draw_motion(arm, seed) for seed in seeds]
+    motions = [sample_motion(arm, seed) for seed in seeds]
     rngs = [scene_rng(seed, 2 if scenario == STEP else 3) for seed in seeds]
     onsets = [round(POLICY_RATE_HZ * rng.uniform(0.3, m.meets_s)) for rng, m in zip(rngs, motions, strict=True)]
     worlds = Worlds(arm, [motion.world((), real=True) for motion in motions], controller, len(motions), seeds)
@@ -182,7 +182,7 @@ def push_trials(arm: Arm, name: str, controller: ControllerConfig, seeds: Sequen
     pieces: list[list[np.ndarray]] = [[] for _ in motions]
     for step in range(max(onsets) + _AFTER_STEPS):
         for i in (i for i, onset in enumerate(onsets) if onset == step):
-            pushes[i] = push = draw_push(arm, worlds.datas[i].qpos[: arm.n], rngs[i], scenario)
+            pushes[i] = push = sample_push(arm, worlds.datas[i].qpos[: arm.n], rngs[i], scenario)
             now = play.ticks / 1000.0
             worlds.push(i, f"link{push.link}", push.point, push.force, now, now + 1.0, ramp_s=0.001)
         ticks = play.step(steps)
@@ -246,11 +246,11 @@ class Strokes(Motion):
         return self.start.position + 0.5 * (1.0 - math.cos(phase)) * self.way
 
 
-def draw_strokes(arm: Arm, seed: int, n: int) -> list[Strokes]:
+def paint_strokes(arm: Arm, seed: int, n: int) -> list[Strokes]:
     """Give the strokes of the first n scenes from a seed on that do not hold."""
     found: list[Strokes] = []
     while len(found) < n:
-        motion = draw_motion(arm, seed)
+        motion = sample_motion(arm, seed)
         if not motion.holds:
             found.append(Strokes(**{name: getattr(motion, name) for name in Motion.__dataclass_fields__}))
         seed += 1

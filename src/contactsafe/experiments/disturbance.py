@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.envs.config import ActionConfig, WipingConfig
 from contactsafe.envs.tasks import WipingTasks
-from contactsafe.experiments.collision_scenes import draw_plant, scene_rng
+from contactsafe.experiments.collision_scenes import sample_plant, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
@@ -69,7 +69,7 @@ def push_force(seed: int, link: int) -> np.ndarray:
 def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
     config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS, press=_PRESS))
     arm = robots.panda()
-    worlds = [WorldConfig(plant=draw_plant(scene_rng(seed, 0), arm.n), sensors=REAL_SENSORS) for seed in seeds]
+    worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), arm.n), sensors=REAL_SENSORS) for seed in seeds]
     tasks = WipingTasks(config, len(seeds), list(seeds), worlds)
     x, y, z = tasks.config.world.board.centre
     start = np.array([x, y, z + _HOLD_HEIGHT])

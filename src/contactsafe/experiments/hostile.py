@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.core.rotation import rotvec_to_quat
-from contactsafe.experiments.collision_scenes import draw_plant, draw_thing, scene_rng
+from contactsafe.experiments.collision_scenes import sample_obstacle, sample_plant, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Trial
 from contactsafe.experiments.run import Progress
@@ -61,7 +61,7 @@ def run_hostile(arm: Arm, controller, seeds, ticks: int = TICKS) -> list[dict[st
     while MAX_TICKS * len(pieces) < ticks:
         for i, rng in enumerate(rngs):
             if rng.random() < 0.2:
-                spoil_target(worlds.controllers[i]["target"], arm, rng)
+                corrupt_target(worlds.controllers[i]["target"], arm, rng)
         worlds.run(MAX_TICKS, trace)
         pieces.append(trace.copy())
     worlds.close()
@@ -71,26 +71,26 @@ def run_hostile(arm: Arm, controller, seeds, ticks: int = TICKS) -> list[dict[st
 
 def _world(arm: Arm, rng: np.random.Generator) -> WorldConfig:
     things = tuple(_thing(rng) for _ in range(_THINGS))
-    return WorldConfig(plant=draw_plant(rng, arm.n), sensors=REAL_SENSORS, obstacles=things)
+    return WorldConfig(plant=sample_plant(rng, arm.n), sensors=REAL_SENSORS, obstacles=things)
 
 
 def _thing(rng: np.random.Generator) -> Obstacle:
     """Draw something in the arm's reach, clear of where it stands at first."""
     angle, distance = rng.uniform(0.5, 2 * np.pi - 0.5), rng.uniform(0.35, 0.6)
     position = (float(distance * np.cos(angle)), float(distance * np.sin(angle)), float(rng.uniform(0.2, 0.8)))
-    return replace(draw_thing(rng, rng.uniform(0.03, 0.08), may_be_fixed=True), position=position)
+    return replace(sample_obstacle(rng, rng.uniform(0.03, 0.08), may_be_fixed=True), position=position)
 
 
-def spoil_target(target, arm: Arm, rng: np.random.Generator) -> None:
+def corrupt_target(target, arm: Arm, rng: np.random.Generator) -> None:
     """Write a target that no sane policy would ask for into a `target_dtype` record."""
     scale = 10.0 ** rng.uniform(-2, 3)
     target["position"] = np.array([0.4, 0.0, 0.4]) + scale * rng.standard_normal(3)
     target["quat"] = rotvec_to_quat(rng.uniform(-np.pi, np.pi, 3))
     target["K_task"] = rng.choice([10.0, 1500.0, rng.uniform(10, 1500)], 6)
     target["D_task"] = rng.choice([2.0, 120.0, rng.uniform(2, 120)], 6)
-    target["q_pose"] = rng.uniform(4 * arm.q_min, 4 * arm.q_max)
+    target["q_posture"] = rng.uniform(4 * arm.q_min, 4 * arm.q_max)
     if rng.random() < 0.3:
-        field = rng.choice(["position", "quat", "K_task", "D_task", "q_pose"])
+        field = rng.choice(["position", "quat", "K_task", "D_task", "q_posture"])
         target[field][rng.integers(target[field].shape[0])] = rng.choice([np.nan, np.inf, -np.inf, 1e300, -5.0, 0.0])
 
 

@@ -98,11 +98,11 @@ def held_before_forearm(tasks: WipingTasks, make: Callable[..., Obstacle], rng: 
 
 def forearm(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, float]:
     """Give middle, (3,) m, and radius, m, of the forearm's thickest capsule at q (n,) rad."""
-    if arm.facts is None or arm.tool is None:
+    if arm.description is None or arm.tool is None:
         raise InvalidInputError(
-            f"arm '{arm.name}' has no facts to draw a forearm from; give contactsafe.robots.panda()"
+            f"arm '{arm.name}' has no description to draw a forearm from; give contactsafe.robots.panda()"
         )
-    starts, ends, radii, links = arm_capsules(arm.facts, arm.tool, q[None])
+    starts, ends, radii, links = arm_capsules(arm.description, arm.tool, q[None])
     of_link = np.flatnonzero(np.asarray(links) == _FOREARM_LINK)
     thickest = of_link[np.argmax(radii[of_link])]
     return (starts[0, thickest] + ends[0, thickest]) / 2, float(radii[thickest])

@@ -13,7 +13,7 @@ from contactsafe.experiments.motions import Playback
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.stepping import act, begin_report, end_tick, sense
+from contactsafe.sim.stepping import act, begin_step_metrics, end_tick, sense
 from contactsafe.sim.world import MAX_TICKS, Worlds
 
 SEEN, NO_CALL, LOST, FROZEN, VELOCITY_JUMPS, POSITION_JUMPS, NUDGED = range(7)
@@ -43,7 +43,7 @@ class LateWorlds(Worlds):
         traces = self.no_trace if trace is None else trace
 
         def share(start: int, stop: int) -> None:
-            noise = self.draw_noise(start, stop)
+            noise = self.sample_noise(start, stop)
             _run_late(
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces, self.codes,
                 self.timed, self._held,
@@ -56,13 +56,13 @@ class LateWorlds(Worlds):
 def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, traces, codes, timed, held):
     for i in range(start, stop):
         plant, controller = plants[i], controllers[i]
-        begin_report(reports[i], ticks[i])
+        begin_step_metrics(reports[i], ticks[i])
         for k in range(ticks[i]):
             sense(plant, controller, noise[i, k])
             code = codes[i, plant.tick]
             controller.measurement.has_time = 1 if timed else 0
             controller.measurement.time = plant.tick * controller.params.dt
-            _spoil(controller.measurement, code, held[i])
+            _corrupt(controller.measurement, code, held[i])
             if code != NO_CALL:
                 control_tick(controller)
             act(plant, controller, noise[i, k])
@@ -71,7 +71,7 @@ def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, tr
 
 
 @compiled
-def _spoil(measurement, code, held):
+def _corrupt(measurement, code, held):
     """Make of a measurement what the controller sees; `held` has the last one as it was seen."""
     n = measurement.q.shape[0]
     if code == FROZEN:

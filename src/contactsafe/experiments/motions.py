@@ -65,7 +65,7 @@ class Playback(Independent):
 
     def _aim(self, i: int, time_s: float) -> None:
         """Set x_d where the motion has it, within its lead, and the posture that goes with it."""
-        motion, arm, tool, q_pose = self.motions[i], self.worlds.arm, self._tool[i], self._target["q_pose"][i]
+        motion, arm, tool, q_posture = self.motions[i], self.worlds.arm, self._tool[i], self._target["q_posture"][i]
         position = motion.target(time_s)
         if motion.limited:
             away = position - tool
@@ -74,9 +74,9 @@ class Playback(Independent):
                 position = tool + away * (LEAD_M / distance)
         self._target["position"][i] = position
         q = np.empty(arm.n)
-        error, turn = solve_ik(self._nominal.handle, position, motion.start.quat, q_pose, arm.q_min, arm.q_max, q)
+        error, turn = solve_ik(self._nominal.handle, position, motion.start.quat, q_posture, arm.q_min, arm.q_max, q)
         if error < 1e-3 and turn < 1e-2:
-            q_pose[:] = q
+            q_posture[:] = q
 
 
 def record(worlds: Worlds, motions: Sequence[Motion]) -> list[np.ndarray]:

@@ -12,7 +12,7 @@ from contactsafe.core.native import mj_step
 from contactsafe.envs.config import WipingConfig
 from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
 from contactsafe.learning.policy import Policy
-from contactsafe.sim.camera import draw_mask
+from contactsafe.sim.camera import render_mask_into
 from contactsafe.sim.records import noise_channels
 from contactsafe.sim.stepping import run_ticks
 
@@ -119,7 +119,7 @@ def _parts(tasks: dict[str, WipingTasks], policy: Policy) -> list[_Part]:
 
     def masks():
         for _ in range(50):
-            draw_mask(worlds.camera, worlds.ledger.shown[0], worlds.plants[0], worlds.masks[0])
+            render_mask_into(worlds.camera, worlds.ink_index.shown[0], worlds.plants[0], worlds.masks[0])
 
     def act():
         for _ in range(20):

@@ -71,7 +71,7 @@ def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
         "damping_z_free": _mean(trace["D_task"][~touching, _Z]),
         "damping_z_contact": _mean(trace["D_task"][touching, _Z]),
         "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
-        "contact_mode_share": float(trace["mode"].mean()),
+        "contact_mode_fraction": float(trace["mode"].mean()),
     }
 
 

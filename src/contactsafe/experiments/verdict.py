@@ -11,7 +11,7 @@ from contactsafe.experiments.results import Table, Trial
 BASELINE = "vices"
 """The controller that the others are compared with; the first one where it was not run."""
 
-HARDER_SHARE, HARDER_N = 1.05, 5.0
+REGRESSION_FRACTION, REGRESSION_N = 1.05, 5.0
 """A trial counts as harder where its peak passes the baseline's by both: this multiple, and this much, N."""
 
 SOFT_N_M = 5e3
@@ -30,7 +30,7 @@ class Verdict:
     Attributes:
         compared: trials in which the obstacle was touched under either of the two; all figures are of these.
         left_out: trials in which it was touched under neither.
-        harder: trials whose peak passes the baseline's by `HARDER_SHARE` and `HARDER_N`.
+        harder: trials whose peak passes the baseline's by `REGRESSION_FRACTION` and `REGRESSION_N`.
         peak_ratio: median of the trials' ratios of peaks, baseline to controller, each at least `FLOOR_N`.
         peak_ratio_soft: the same over obstacles of `SOFT_N_M` at most.
         peak_ratio_sweeps, peak_ratio_soft_sweeps: both over the sweeps alone, where the arm runs into something.
@@ -90,7 +90,7 @@ def judge(trials: Sequence[Trial], baseline: Sequence[Trial]) -> Verdict:
     return Verdict(
         compared=len(kept),
         left_out=len(pairs) - len(kept),
-        harder=int(((peak > HARDER_SHARE * peak_before) & (peak > peak_before + HARDER_N)).sum()),
+        harder=int(((peak > REGRESSION_FRACTION * peak_before) & (peak > peak_before + REGRESSION_N)).sum()),
         peak_ratio=_percentile(peak_ratio, 50),
         peak_ratio_soft=_percentile(peak_ratio[soft], 50),
         peak_ratio_sweeps=_percentile(peak_ratio[sweeps], 50),
@@ -161,7 +161,7 @@ def verdict_table(trials: Sequence[Trial]) -> Table:
         (label.format(baseline=baseline), unit, *(scale * getattr(verdict, field) for verdict in columns.values()))
         for field, label, unit, scale in _ROWS
     )
-    note = _NOTE.format(share=100 * (HARDER_SHARE - 1), n=HARDER_N, floor=FLOOR_N, baseline=baseline)
+    note = _NOTE.format(share=100 * (REGRESSION_FRACTION - 1), n=REGRESSION_N, floor=FLOOR_N, baseline=baseline)
     title = f"Every controller against {baseline}, trial by trial"
     return Table("verdict", title, ("figure", "unit", *columns), rows, note)
 

@@ -89,7 +89,7 @@ class SacConfig(PolicyConfig):
         learning_starts: steps with actions drawn at random before the first update.
         update_every: steps of each environment between updates.
         gradient_steps: gradient steps of an update.
-        target_share: of the way that the target networks go towards the critics in a gradient step.
+        target_fraction: of the way that the target networks go towards the critics in a gradient step.
         entropy_start: first weight of the entropy; it is then tuned to an entropy of minus the number of actions. It
             falls slowly: what is far above a step's reward, of some hundredths, is all that counts for long.
     """
@@ -107,7 +107,7 @@ class SacConfig(PolicyConfig):
     learning_starts: int = 10_000
     update_every: int = 1
     gradient_steps: int = 4
-    target_share: float = 0.005
+    target_fraction: float = 0.005
     entropy_start: float = 0.005
 
     def __post_init__(self):
@@ -129,7 +129,7 @@ class SacConfig(PolicyConfig):
             buffer_size=self.buffer,
             learning_starts=self.learning_starts,
             batch_size=self.batch,
-            tau=self.target_share,
+            tau=self.target_fraction,
             gamma=self.discount**self.action_repeat,
             train_freq=self.update_every,
             gradient_steps=self.gradient_steps,

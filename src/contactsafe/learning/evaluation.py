@@ -22,7 +22,7 @@ FIGURES = {
     "peak_force_max_n": "the same: largest of all",
     "contact_force_median_n": "force on the tool, N, the largest of each policy step in contact: median",
     "arm_table_contacts": "episodes ended because something other than the pad met board or table",
-    "contact_share": "share of all policy steps in which the tool was in contact; the rest goes from patch to patch",
+    "contact_fraction": "share of all policy steps in which the tool was in contact; the rest goes from patch to patch",
     "return_mean": "sum of an episode's rewards: mean",
 }
 """What `evaluate_policy` gives, in its order, and what it means; forces are the simulator's."""
@@ -138,7 +138,7 @@ def _summary(records, contact_forces, all_steps):
         "peak_force_max_n": float(peaks.max()),
         "contact_force_median_n": float(np.median(forces)) if len(forces) else 0.0,
         "arm_table_contacts": int(sum(r["arm_touched"] for r in records)),
-        "contact_share": float(len(forces) / all_steps),
+        "contact_fraction": float(len(forces) / all_steps),
         "return_mean": float(returns.mean()),
         "records": records,
     }

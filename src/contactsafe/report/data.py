@@ -111,7 +111,7 @@ class Experiment(Protocol):
         ...
 
 
-class RunFacts(TypedDict, total=False):
+class RunInfo(TypedDict, total=False):
     """What is known of the run beside its figures; every entry may be left out, others are passed on to the summary.
 
     Attributes:

@@ -10,7 +10,7 @@ from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.report import data
 from contactsafe.report.data import Experiment, Recording
 from contactsafe.report.scene import INK, INK_RGB, OBJECT, OBJECT_RGB, Subject, fit
-from contactsafe.robot.facts import Capsule, Quaternion, Vector3
+from contactsafe.robot.description import Capsule, Quaternion, Vector3
 
 FRAMES_HZ = 60
 Q_UNIT, POSITION_UNIT, FORCE_UNIT = 2e-4, 1e-4, 0.05

@@ -7,18 +7,18 @@ from string import Template
 from typing import Any
 
 from contactsafe.report import data
-from contactsafe.report.data import Experiment, RunFacts
+from contactsafe.report.data import Experiment, RunInfo
 from contactsafe.report.output import prepare_output, write_whole
 from contactsafe.report.summary import trials_csv, write_summary
 
 
-def write_report(folder, experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> Path:
+def write_report(folder, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
     """Write `report.html`, `summary.json` and every experiment's trials as CSV.
 
     Args:
         folder: where to.
         experiments: what was measured.
-        facts: of the run; see `RunFacts`.
+        info: of the run; see `RunInfo`.
 
     Returns:
         Path of the page.
@@ -27,19 +27,19 @@ def write_report(folder, experiments: Sequence[Experiment], facts: RunFacts | Ma
         OutputError: the folder cannot be written; no half-written file is left behind.
     """
     folder = prepare_output(folder)
-    page = render(experiments, facts)
-    write_summary(folder, experiments, facts)
+    page = render(experiments, info)
+    write_summary(folder, experiments, info)
     for experiment in experiments:
         write_whole(folder / f"{experiment.name}.csv", trials_csv(experiment))
     return write_whole(folder / "report.html", page)
 
 
-def render(experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> str:
+def render(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> str:
     """Give the page as text."""
     from contactsafe.report import sections  # brings matplotlib, which the other commands need not wait for
 
     names = data.controllers(experiments)
-    parts = sections.parts(experiments, names, facts)
+    parts = sections.parts(experiments, names, info)
     return Template(_file("page.html")).substitute(
         parts, style=_colours(names) + _file("style.css"), script=_file("film.js")
     )

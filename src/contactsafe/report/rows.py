@@ -15,7 +15,7 @@ class Aim:
         below: largest value allowed, in the row's unit.
         above: smallest value allowed, in the row's unit.
         share: largest multiple of the baseline's median allowed.
-        at_least_share: smallest multiple of the baseline's median allowed.
+        fraction_at_least: smallest multiple of the baseline's median allowed.
         baseline_above: judge only where the baseline's median passes this, in the row's unit.
         worst: judge the largest value over seeds.
         scenarios: words of which one must stand in the scenario's name; empty for all.
@@ -24,7 +24,7 @@ class Aim:
     below: float | None = None
     above: float | None = None
     share: float | None = None
-    at_least_share: float | None = None
+    fraction_at_least: float | None = None
     baseline_above: float | None = None
     worst: bool = False
     scenarios: tuple[str, ...] = ()
@@ -42,8 +42,8 @@ class Aim:
             parts.append(f"{'always ' if self.worst else ''}under {self.below:g} {unit}")
         if self.share is not None:
             parts.append(f"at most {_fraction(self.share)} of {BASELINE}")
-        if self.at_least_share is not None:
-            parts.append(f"at least {_fraction(self.at_least_share)} of {BASELINE}")
+        if self.fraction_at_least is not None:
+            parts.append(f"at least {_fraction(self.fraction_at_least)} of {BASELINE}")
         if self.baseline_above is not None:
             parts.append(f"where {BASELINE} passes {self.baseline_above:g}")
         return " ".join(parts)
@@ -56,13 +56,13 @@ class Aim:
         of_baseline = ratio(value, baseline)
         if self.baseline_above is not None and not (baseline and scale * baseline.median > self.baseline_above):
             return None
-        if (self.share is not None or self.at_least_share is not None) and not math.isfinite(of_baseline):
+        if (self.share is not None or self.fraction_at_least is not None) and not math.isfinite(of_baseline):
             return None
         return (
             (self.below is None or found <= self.below)
             and (self.above is None or found >= self.above)
             and (self.share is None or of_baseline <= self.share)
-            and (self.at_least_share is None or of_baseline >= self.at_least_share)
+            and (self.fraction_at_least is None or of_baseline >= self.fraction_at_least)
         )
 
 
@@ -130,7 +130,7 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
     "task-safety": (
         Row(
             "ink_removed", "ink removed, mean", "%", 100.0, main=True,
-            aim=Aim(above=80.0, at_least_share=0.95), mean=True,
+            aim=Aim(above=80.0, fraction_at_least=0.95), mean=True,
         ),
         Row("clean", "boards wiped clean, mean", "%", 100.0, main=True, mean=True),
         Row("time_s", "time to a clean board", "s"),
@@ -175,8 +175,8 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("tool_error_mm", "tool away from its free motion, most", "mm"),
         Row("tool_error_end_mm", "tool away from its free motion, at the end", "mm"),
         Row("tool_force_peak_n", "tool force, peak", "N"),
-        Row("yielding_share", "time spent yielding", "%", 100.0),
-        Row("holding_share", "time spent holding", "%", 100.0),
+        Row("comply_fraction", "time spent yielding", "%", 100.0),
+        Row("reject_fraction", "time spent holding", "%", 100.0),
         Row("mode_switches", "changes of mode", ""),
         Row("limit_touches", "touches of joint limits", ""),
         Row("met", "trials in which the obstacle was touched, mean", "%", 100.0, mean=True),

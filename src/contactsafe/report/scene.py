@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.report.data import Recording
-from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.shape import arm_capsules, pad_box
 from contactsafe.sim.config import BoardConfig
 
@@ -27,12 +27,12 @@ class Subject:
     """What is filmed: an arm with its tool, over a board.
 
     Attributes:
-        arm: its facts.
+        arm: its info.
         tool: what it carries.
         board: the whiteboard.
     """
 
-    arm: ArmFacts
+    arm: ArmDescription
     tool: Tool
     board: BoardConfig
 

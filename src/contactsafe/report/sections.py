@@ -9,7 +9,7 @@ import numpy as np
 import contactsafe
 from contactsafe.learning.evaluation import CONTACT_N
 from contactsafe.report import data, rows, strip, tables
-from contactsafe.report.data import Experiment, Recording, RunFacts
+from contactsafe.report.data import Experiment, Recording, RunInfo
 from contactsafe.report.film import film_json
 from contactsafe.report.plots import Curve, Panel, Plotter, spans
 from contactsafe.report.scene import Subject
@@ -32,20 +32,18 @@ _OF_POLICY = ("task-safety", "joint-safety")
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
 
-def parts(
-    experiments: Sequence[Experiment], names: Sequence[str], facts: RunFacts | Mapping[str, Any]
-) -> dict[str, str]:
+def parts(experiments: Sequence[Experiment], names: Sequence[str], info: RunInfo | Mapping[str, Any]) -> dict[str, str]:
     """Give every piece of the page's template by name, as HTML."""
     plotter = Plotter(names)
     key = [f"<dt {tables.coloured(name)}>{escape(name)}</dt><dd>{escape(ABOUT.get(name, ''))}</dd>" for name in names]
     return {
-        "version": escape(str(facts.get("version", contactsafe.__version__))),
+        "version": escape(str(info.get("version", contactsafe.__version__))),
         **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers")),
         "key": "\n".join(key),
         "cards": tables.cards(experiments, names),
         "results": tables.table(experiments, names, main_only=True) + tables.tally(experiments, names),
-        "sections": "\n".join(_section(experiment, names, plotter, facts) for experiment in experiments),
-        "method": _method(experiments, names, facts),
+        "sections": "\n".join(_section(experiment, names, plotter, info) for experiment in experiments),
+        "method": _method(experiments, names, info),
     }
 
 
@@ -67,7 +65,7 @@ def _head(experiments: Sequence[Experiment], count: str) -> dict[str, str]:
     return {"title": f"contactsafe: {count}, {what}", "headline": headline, "lead": lead}
 
 
-def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter, facts: Mapping[str, Any]) -> str:
+def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter, info: Mapping[str, Any]) -> str:
     title = rows.TITLES.get(experiment.name, experiment.name)
     return "\n".join(
         [
@@ -75,7 +73,7 @@ def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter, fac
             f"<h2>{escape(title)}</h2>",
             f'<p class="question">{escape(experiment.question)}</p>',
             _film(experiment),
-            _curves(experiment, plotter, facts),
+            _curves(experiment, plotter, info),
             *(tables.plain(own) for own in experiment.tables),
             f"<h3>All figures</h3>{tables.table([experiment], names)}",
             tables.verdict(experiment, names),
@@ -98,7 +96,7 @@ def _film(experiment: Experiment) -> str:
     )
 
 
-def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) -> str:
+def _curves(experiment: Experiment, plotter: Plotter, info: Mapping[str, Any]) -> str:
     names = data.scenarios(experiment)
     if experiment.name == "joint-safety":
         panels = [
@@ -122,7 +120,7 @@ def _curves(experiment: Experiment, plotter: Plotter, facts: Mapping[str, Any]) 
         )
     if experiment.name == "disturbance":
         panels = [Panel(f"tool error, {axis} (mm)", _component("error", i, 1000.0)) for i, axis in enumerate("xyz")]
-        bands = [facts["push_s"]] if facts.get("push_s") else []
+        bands = [info["push_s"]] if info.get("push_s") else []
         drawn = [_titled(name, plotter.plot(experiment, name, panels, bands, columns=3)) for name in names]
         said = "Departure of the tool from where it is without the push." + (" Shaded: the push." if bands else "")
         return _figure(drawn, experiment, said, "plots")
@@ -192,9 +190,9 @@ def _component(field: str, index: int, scale: float = 1.0) -> Curve:
     return curve
 
 
-def _method(experiments: Sequence[Experiment], names: Sequence[str], facts: Mapping[str, Any]) -> str:
+def _method(experiments: Sequence[Experiment], names: Sequence[str], info: Mapping[str, Any]) -> str:
     runs = sum(len(experiment.as_dict()["trials"]) for experiment in experiments)
-    seeds = list(facts.get("seeds", ()))
+    seeds = list(info.get("seeds", ()))
     text = (
         "<p>Contact forces and external torques are the simulator's own (MuJoCo at 1 kHz); no controller sees them. "
         "The residual is what a controller's momentum observer makes of its sensors. For one seed, all controllers get "
@@ -213,19 +211,19 @@ def _method(experiments: Sequence[Experiment], names: Sequence[str], facts: Mapp
     found = {
         "Runs": escape(f"{runs}: {', '.join(names)}") if names else str(runs),
         "Seeds": _seeds(seeds),
-        "Command": f"<code>{escape(str(facts['command']))}</code>" if facts.get("command") else "",
-        "Policy bundle": f"<code>SHA-256 {escape(str(facts['bundle_sha256']))}</code>"
-        if facts.get("bundle_sha256")
+        "Command": f"<code>{escape(str(info['command']))}</code>" if info.get("command") else "",
+        "Policy bundle": f"<code>SHA-256 {escape(str(info['bundle_sha256']))}</code>"
+        if info.get("bundle_sha256")
         else "",
-        "Made": escape(str(facts.get("when", ""))),
+        "Made": escape(str(info.get("when", ""))),
         "Versions": escape(
             ", ".join(
-                [f"contactsafe {facts.get('version', contactsafe.__version__)}"]
+                [f"contactsafe {info.get('version', contactsafe.__version__)}"]
                 + [f"{name} {number}" for name, number in versions().items()]
             )
         ),
     }
-    return text + '<dl class="facts">' + "".join(f"<dt>{k}</dt><dd>{v}</dd>" for k, v in found.items() if v) + "</dl>"
+    return text + '<dl class="info">' + "".join(f"<dt>{k}</dt><dd>{v}</dd>" for k, v in found.items() if v) + "</dl>"
 
 
 def _seeds(seeds: Sequence[int]) -> str:

@@ -11,20 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import contactsafe
-from contactsafe.report.data import Experiment, RunFacts
+from contactsafe.report.data import Experiment, RunInfo
 from contactsafe.report.output import prepare_output, write_whole
 
 PACKAGES = ("numpy", "numba", "mujoco", "onnxruntime")
 """Packages that figures may depend on."""
 
 
-def write_summary(folder, experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> Path:
+def write_summary(folder, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
     """Write `summary.json`.
 
     Args:
         folder: where to.
         experiments: what was measured.
-        facts: of the run; entries beyond `RunFacts` are passed on.
+        info: of the run; entries beyond `RunInfo` are passed on.
 
     Returns:
         Path of the file.
@@ -32,14 +32,14 @@ def write_summary(folder, experiments: Sequence[Experiment], facts: RunFacts | M
     Raises:
         OutputError: it cannot be written; nothing is left behind.
     """
-    summary = summarise(experiments, facts)
+    summary = summarise(experiments, info)
     return write_whole(prepare_output(folder) / "summary.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
 
 
-def summarise(experiments: Sequence[Experiment], facts: RunFacts | Mapping[str, Any]) -> dict[str, Any]:
-    """Give what `summary.json` holds: facts of the run, versions, experiments by name."""
+def summarise(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> dict[str, Any]:
+    """Give what `summary.json` holds: info of the run, versions, experiments by name."""
     head: dict[str, Any] = {"version": contactsafe.__version__}
-    head |= {key: list(value) if isinstance(value, tuple | range) else value for key, value in facts.items()}
+    head |= {key: list(value) if isinstance(value, tuple | range) else value for key, value in info.items()}
     return head | {
         "versions": versions(),
         "experiments": {experiment.name: experiment.as_dict() for experiment in experiments},

@@ -1,1 +1,1 @@
-"""What an arm is: facts of each robot, models generated from them, nominal dynamics, inverse kinematics."""
+"""What an arm is: description of each robot, models generated from them, nominal dynamics, inverse kinematics."""

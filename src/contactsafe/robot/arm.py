@@ -10,11 +10,11 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.binding import Binding, bind_joints
+from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
-from contactsafe.robot.facts import ArmFacts, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
-from contactsafe.robot.skin import SKIN_COLUMNS, capsule_skin
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
+from contactsafe.robot.surface import SURFACE_COLUMNS, capsule_surface
 
 
 class Pose(NamedTuple):
@@ -38,15 +38,15 @@ class NominalModel(Independent):
 
     _bound = ("_data", "handle")
 
-    def __init__(self, model: mujoco.MjModel, site: str, skin: np.ndarray, lever_doubted: float):
+    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray, lever_doubted: float):
         self._model = model
-        self._site, self._skin = site, np.ascontiguousarray(skin, dtype=float)
+        self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
         self._lever_doubted = lever_doubted
         self._bind()
 
     def _bind(self) -> None:
         self._data = mujoco.MjData(self._model)
-        self.handle = make_handle(self._model, self._data, self._site, self._skin, self._lever_doubted)[0]
+        self.handle = make_handle(self._model, self._data, self._site, self._surface, self._lever_doubted)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +63,10 @@ class Arm(Independent):
         torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
-        facts: what the model was generated from; None for a user's own.
+        description: what the model was generated from; None for a user's own.
         tool: what the flange carries; None for a user's own.
-        skin: points of the links' surface, (P, 7), rows as in `contactsafe.robot.skin`; empty where unknown.
-        lever_doubted: lever arm at which a point of the skin is hardly believed to be a contact, m: of points that
+        surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
+        lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
     Raises:
@@ -84,9 +84,9 @@ class Arm(Independent):
     torque_rate_max: float
     friction: np.ndarray
     home: np.ndarray
-    facts: ArmFacts | None = None
+    description: ArmDescription | None = None
     tool: Tool | None = None
-    skin: np.ndarray = field(default_factory=lambda: np.zeros((0, SKIN_COLUMNS)))
+    surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
 
     def __post_init__(self):
@@ -118,7 +118,7 @@ class Arm(Independent):
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site, self.skin, self.lever_doubted)
+        return NominalModel(self.model, self.site, self.surface, self.lever_doubted)
 
     def joint_vector(self, value, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.
@@ -170,20 +170,20 @@ def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.n
     return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
 
 
-def arm_from_facts(facts: ArmFacts, tool: Tool) -> Arm:
-    """Build an arm from its facts and a tool."""
+def arm_from_description(description: ArmDescription, tool: Tool) -> Arm:
+    """Build an arm from its description and a tool."""
     return Arm(
-        name=facts.name,
-        model=mujoco.MjModel.from_xml_string(arm_mjcf(facts, tool)),
+        name=description.name,
+        model=mujoco.MjModel.from_xml_string(arm_mjcf(description, tool)),
         site=TOOL_SITE,
-        q_min=facts.joint_array("q_min"),
-        q_max=facts.joint_array("q_max"),
-        qd_max=facts.joint_array("qd_max"),
-        tau_max=facts.joint_array("tau_max"),
-        torque_rate_max=facts.torque_rate_max,
-        friction=facts.joint_array("friction"),
-        home=np.array(facts.home),
-        facts=facts,
+        q_min=description.joint_array("q_min"),
+        q_max=description.joint_array("q_max"),
+        qd_max=description.joint_array("qd_max"),
+        tau_max=description.joint_array("tau_max"),
+        torque_rate_max=description.torque_rate_max,
+        friction=description.joint_array("friction"),
+        home=np.array(description.home),
+        description=description,
         tool=tool,
-        skin=capsule_skin(facts),
+        surface=capsule_surface(description),
     )

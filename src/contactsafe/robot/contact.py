@@ -1,6 +1,6 @@
 """Where on an arm something touches it, from the joint torque alone; compiled.
 
-A contact without friction pushes along the surface's normal, so each point of the skin has one direction of joint
+A contact without friction pushes along the surface's normal, so each point of the surface has one direction of joint
 torque, t = J_pᵀ n; the point whose t is nearest in angle to the torque found explains it best (Manuelli & Tedrake 2016
 search the same way with particles). Where an arm doubts short lever arms, of points that explain it alike the one that
 takes less force. What gives no torque, near a joint's axis, cannot be told apart by anybody.
@@ -13,7 +13,7 @@ from numpy import empty, zeros
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross_into, dot, matvec, spd_inverse
 from contactsafe.core.native import view2
-from contactsafe.robot.skin import SKIN_COLUMNS
+from contactsafe.robot.surface import SURFACE_COLUMNS
 
 _LEVER_DAMPING, _LEVER_MAX = 1e-4, 1.0  # m², m
 _NO_LEVER = 1e-9  # m; a point with less explains no torque, and its square may be too small for a number
@@ -55,8 +55,8 @@ def contact_lever(handle, link, direction):
 
 
 @compiled
-def skin_torque(handle, index, out):
-    """Fill the joint torque that 1 N on a point of the skin, inwards along its normal, puts on the arm, (n,), N m.
+def surface_torque(handle, index, out):
+    """Fill the joint torque that 1 N on a point of the surface, inwards along its normal, puts on the arm, (n,), N m.
 
     Args:
         handle: of the nominal model, brought up to date by `update_dynamics`.
@@ -67,7 +67,7 @@ def skin_torque(handle, index, out):
         The link that the point is on, 1 … n.
     """
     n = out.shape[0]
-    row = view2(handle.skin, handle.skin_points, SKIN_COLUMNS)[index]
+    row = view2(handle.surface, handle.surface_points, SURFACE_COLUMNS)[index]
     link = int(row[0])
     body = handle.first_body + link - 1
     R = view2(handle.xmat, handle.nbody, 9)[body]
@@ -89,7 +89,7 @@ def skin_torque(handle, index, out):
 
 @compiled
 def best_point(handle, start, stop, torque, scratch, best, best_fit):
-    """Search part of the skin for the point that explains a joint torque best.
+    """Search part of the surface for the point that explains a joint torque best.
 
     Args:
         handle: of the nominal model.
@@ -104,7 +104,7 @@ def best_point(handle, start, stop, torque, scratch, best, best_fit):
     """
     doubted = handle.lever_doubted * handle.lever_doubted
     for index in range(start, stop):
-        skin_torque(handle, index, scratch)
+        surface_torque(handle, index, scratch)
         along = dot(scratch, torque)
         if not along > _NO_LEVER:
             continue

@@ -30,9 +30,9 @@ _VIEWED = (
 )  # fmt: skip
 
 handle_dtype = np.dtype(
-    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "skin")]
+    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "surface")]
     + [
-        ("skin_points", np.int64),
+        ("surface_points", np.int64),
         ("site", np.int64),
         ("first_body", np.int64),
         ("tool_body", np.int64),
@@ -66,18 +66,18 @@ def dynamics_dtype(n: int) -> np.dtype:
 
 
 def make_handle(
-    model: mujoco.MjModel, data: mujoco.MjData, site: str, skin: np.ndarray, lever_doubted: float
+    model: mujoco.MjModel, data: mujoco.MjData, site: str, surface: np.ndarray, lever_doubted: float
 ) -> np.ndarray:
     """Fill a handle for a model of one serial arm, array of one `handle_dtype` record.
 
-    The caller keeps `model`, `data` and `skin` (rows as in `contactsafe.robot.skin`) alive while the handle is used;
+    The caller keeps `model`, `data` and `surface` (rows as in `contactsafe.robot.surface`) alive as long as the handle;
     `lever_doubted`, m, is the arm's.
     """
     handle = np.zeros(1, dtype=handle_dtype)
     handle["model"], handle["data"] = model._address, data._address
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
-    handle["skin"], handle["skin_points"] = skin.ctypes.data, len(skin)
+    handle["surface"], handle["surface_points"] = surface.ctypes.data, len(surface)
     handle["lever_doubted"] = lever_doubted
     handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data

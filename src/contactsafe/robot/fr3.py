@@ -5,7 +5,7 @@ Robotics). Rotor inertia as the torque loop lets it be felt: identified in torqu
 franka_fr3, 2025-04-25. Friction of this form is not published for the FR3: the Panda's stands in.
 """
 
-from contactsafe.robot.facts import Inertia, Joint
+from contactsafe.robot.description import Inertia, Joint
 from contactsafe.robot.franka import franka_arm
 from contactsafe.robot.panda import FRICTION
 

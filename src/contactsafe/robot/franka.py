@@ -6,7 +6,7 @@ coarse collision shapes of franka_description.
 
 import math
 
-from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Joint, Link, Tool
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tool
 
 _HALF = math.sqrt(0.5)
 _UP = (1.0, 0.0, 0.0, 0.0)
@@ -47,7 +47,7 @@ _CAPSULES = (
 
 def franka_arm(
     name: str, source: str, base: Inertia, inertias: tuple[Inertia, ...], joints: tuple[Joint, ...]
-) -> ArmFacts:
+) -> ArmDescription:
     """Put what one generation has of its own on the common frames.
 
     Args:
@@ -58,7 +58,7 @@ def franka_arm(
         joints: the seven.
     """
     parts = zip(_FRAMES, inertias, joints, _CAPSULES, strict=True)
-    return ArmFacts(
+    return ArmDescription(
         name=name,
         source=source,
         base=base,

@@ -98,8 +98,9 @@ class InverseKinematics(Independent):
         """Find joint positions within the limits that put the tool at a pose, however long it takes.
 
         Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then `posture`; then home and other
-        fixed seeds; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from facts. The same
-        call on the same arm gives the same answer, unless it was TRAC-IK's, whose search is random.
+        fixed seeds; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from a
+        description. The same call on the same arm gives the same answer, unless it was TRAC-IK's,
+        whose search is random.
 
         Args:
             pose: of the tool, world; position (3,) m, unit quaternion w x y z (4,).
@@ -183,16 +184,16 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02):
     """Set up TRAC-IK (Beeson & Ames 2015, Speed mode) on the generated URDF, with the arm's limits.
 
     Args:
-        arm: built from facts.
+        arm: built from a description.
         timeout_s: how long one call may search, s.
 
     Returns:
         `trac_ik.TracIK`, whose `ik(position, rotation, seed)` gives joint positions (n,), rad, or None; or None where
-        TRAC-IK is not installed or the arm came without facts.
+        TRAC-IK is not installed or the arm came without description.
     """
-    if TracIK is None or arm.facts is None or arm.tool is None:
+    if TracIK is None or arm.description is None or arm.tool is None:
         return None
-    with readable("arm.urdf", arm_urdf(arm.facts, arm.tool)) as path:  # it is read once
+    with readable("arm.urdf", arm_urdf(arm.description, arm.tool)) as path:  # it is read once
         solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=timeout_s)
     solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader rounds them to single precision
     return solver

@@ -1,8 +1,8 @@
-"""MJCF generated from an arm's facts: the same arm for the nominal model, the plant and the pictures."""
+"""MJCF generated from an arm's description: the same arm for the nominal model, the plant and the pictures."""
 
 import xml.etree.ElementTree as ET
 
-from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Tool
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Tool
 
 TOOL_SITE = "tcp"
 FLANGE_SITE = "flange"
@@ -42,16 +42,16 @@ def arm_default() -> ET.Element:
     return default
 
 
-def arm_body(facts: ArmFacts, tool: Tool) -> ET.Element:
+def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
     """Build the body tree of an arm with its tool, base at the world origin.
 
     Bodies are `link0` … `link<n>` and `tool`; joints `joint1` …; sites `flange` (in `tool`, at the mount) and `tcp`.
     """
     base = ET.Element("body", name="link0")
-    _inertial(base, facts.base)
-    _capsules(base, "link0", facts.base_capsules)
+    _inertial(base, description.base)
+    _capsules(base, "link0", description.base_capsules)
     parent = base
-    for index, link in enumerate(facts.links, start=1):
+    for index, link in enumerate(description.links, start=1):
         parent = ET.SubElement(parent, "body", name=f"link{index}", pos=numbers(link.position), quat=numbers(link.quat))
         _inertial(parent, link.inertia)
         ET.SubElement(
@@ -64,7 +64,7 @@ def arm_body(facts: ArmFacts, tool: Tool) -> ET.Element:
         )
         _capsules(parent, f"link{index}", link.capsules)
     mount = ET.SubElement(
-        parent, "body", name="tool", pos=numbers(facts.mount_position), quat=numbers(facts.mount_quat)
+        parent, "body", name="tool", pos=numbers(description.mount_position), quat=numbers(description.mount_quat)
     )
     _inertial(mount, tool.inertia)
     _capsules(mount, "tool", tool.capsules)
@@ -94,13 +94,13 @@ def model_root(name: str) -> ET.Element:
     return root
 
 
-def arm_mjcf(facts: ArmFacts, tool: Tool) -> str:
+def arm_mjcf(description: ArmDescription, tool: Tool) -> str:
     """Write the arm alone, fixed at the origin, with motors of the stated torque limits."""
-    root = model_root(facts.name)
+    root = model_root(description.name)
     world = ET.SubElement(root, "worldbody")
-    world.append(arm_body(facts, tool))
+    world.append(arm_body(description, tool))
     actuator = ET.SubElement(root, "actuator")
-    for index, link in enumerate(facts.links, start=1):
+    for index, link in enumerate(description.links, start=1):
         limit = link.joint.tau_max
         ET.SubElement(
             actuator, "motor", name=f"motor{index}", joint=f"joint{index}", ctrlrange=numbers((-limit, limit))

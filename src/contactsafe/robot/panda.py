@@ -6,7 +6,7 @@ Franka Emika Panda robot with retrieval of feasible parameters using penalty-bas
 in the form used by MuJoCo Menagerie. Rotor inertia is not published; 0.1 kg m² a joint is Menagerie's value.
 """
 
-from contactsafe.robot.facts import Inertia, Joint
+from contactsafe.robot.description import Inertia, Joint
 from contactsafe.robot.franka import HAND, WIPING_PAD, franka_arm
 
 __all__ = ["FRICTION", "HAND", "PANDA", "WIPING_PAD"]

@@ -10,7 +10,7 @@ import numpy as np
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
 from contactsafe.robot.arm import Arm, finite_array
-from contactsafe.robot.facts import Inertia
+from contactsafe.robot.description import Inertia
 
 
 class Payload(NamedTuple):

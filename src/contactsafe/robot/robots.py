@@ -1,7 +1,7 @@
 """The robots this package knows by name, and the one in a user's own MJCF."""
 
-from contactsafe.robot.arm import Arm, arm_from_facts
-from contactsafe.robot.facts import Tool
+from contactsafe.robot.arm import Arm, arm_from_description
+from contactsafe.robot.description import Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPING_PAD
 from contactsafe.robot.panda import PANDA
@@ -16,7 +16,7 @@ def panda(tool: Tool = WIPING_PAD) -> Arm:
     Args:
         tool: what the flange carries.
     """
-    return arm_from_facts(PANDA, tool)
+    return arm_from_description(PANDA, tool)
 
 
 def fr3(tool: Tool = WIPING_PAD) -> Arm:
@@ -25,4 +25,4 @@ def fr3(tool: Tool = WIPING_PAD) -> Arm:
     Args:
         tool: what the flange carries.
     """
-    return arm_from_facts(FR3, tool)
+    return arm_from_description(FR3, tool)

@@ -1,17 +1,17 @@
-"""Where an arm's capsules and pad are: kinematics from the facts alone, many postures at once, no MuJoCo."""
+"""Where an arm's capsules and pad are: kinematics from the description alone, many postures at once, no MuJoCo."""
 
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_to_matrix
-from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.description import ArmDescription, Tool
 
 
-def link_frames(facts: ArmFacts, q) -> tuple[np.ndarray, np.ndarray]:
+def link_frames(description: ArmDescription, q) -> tuple[np.ndarray, np.ndarray]:
     """Give the frames of base, links and tool mount in world axes, base at the origin.
 
     Args:
-        facts: the arm, of n joints.
+        description: the arm, of n joints.
         q: joint positions, (F, n), rad.
 
     Returns:
@@ -20,26 +20,26 @@ def link_frames(facts: ArmFacts, q) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         InvalidInputError: q has another shape.
     """
-    n = len(facts.links)
+    n = len(description.links)
     q = np.asarray(q, dtype=float)
     if q.ndim != 2 or q.shape[1] != n:
         raise InvalidInputError(f"q has shape {q.shape}; give F × {n} joint positions, one row a posture")
     origins = np.zeros((len(q), n + 2, 3))
     rotations = np.zeros((len(q), n + 2, 3, 3))
     rotations[:, 0] = np.eye(3)
-    for i, link in enumerate(facts.links, start=1):
+    for i, link in enumerate(description.links, start=1):
         turn = _about_z(q[:, i - 1])
         _attach(origins, rotations, i, link.position, link.quat)
         rotations[:, i] = rotations[:, i] @ turn
-    _attach(origins, rotations, n + 1, facts.mount_position, facts.mount_quat)
+    _attach(origins, rotations, n + 1, description.mount_position, description.mount_quat)
     return origins, rotations
 
 
-def arm_capsules(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def arm_capsules(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Place all capsules of an arm and its tool in the world.
 
     Args:
-        facts: the arm, of n joints.
+        description: the arm, of n joints.
         tool: what the flange carries.
         q: joint positions, (F, n), rad.
 
@@ -50,8 +50,8 @@ def arm_capsules(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray
     Raises:
         InvalidInputError: q has another shape.
     """
-    origins, rotations = link_frames(facts, q)
-    groups = (facts.base_capsules, *(link.capsules for link in facts.links), tool.capsules)
+    origins, rotations = link_frames(description, q)
+    groups = (description.base_capsules, *(link.capsules for link in description.links), tool.capsules)
     owned = [(owner, capsule) for owner, capsules in enumerate(groups) for capsule in capsules]
     links = np.array([owner for owner, _ in owned])
     radii = np.array([capsule.radius for _, capsule in owned])
@@ -60,11 +60,11 @@ def arm_capsules(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray
     return placed[:, :, 0], placed[:, :, 1], radii, links
 
 
-def pad_box(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pad_box(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place the tool's pad in the world.
 
     Args:
-        facts: the arm, of n joints.
+        description: the arm, of n joints.
         tool: what the flange carries, with a pad.
         q: joint positions, (F, n), rad.
 
@@ -76,7 +76,7 @@ def pad_box(facts: ArmFacts, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.
     """
     if tool.pad_half_size is None:
         raise InvalidInputError(f"tool '{tool.name}' has no pad; give one that has, such as robots.WIPING_PAD")
-    origins, rotations = link_frames(facts, q)
+    origins, rotations = link_frames(description, q)
     half = np.array(tool.pad_half_size)
     centre = np.array(tool.tcp) - (0.0, 0.0, half[2])
     return origins[:, -1] + rotations[:, -1] @ centre, half, rotations[:, -1]

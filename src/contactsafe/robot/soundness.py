@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.skin import SKIN_COLUMNS
+from contactsafe.robot.surface import SURFACE_COLUMNS
 
 _MODEL = (
     "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -33,8 +33,8 @@ def as_numbers(arm) -> dict[str, np.ndarray | float]:
     n = int(arm.model.nv)
     fields = {name: array_of(getattr(arm, name), (n, *row), name) for name, row in _PER_JOINT.items()}
     single = {name: float(array_of(getattr(arm, name), (), name)) for name in ("torque_rate_max", "lever_doubted")}
-    points = len(arm.skin) if hasattr(arm.skin, "__len__") else 0
-    return {**fields, **single, "skin": array_of(arm.skin, (points, SKIN_COLUMNS), "skin")}
+    points = len(arm.surface) if hasattr(arm.surface, "__len__") else 0
+    return {**fields, **single, "surface": array_of(arm.surface, (points, SURFACE_COLUMNS), "surface")}
 
 
 def array_of(value, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
@@ -69,7 +69,7 @@ def refuse_unsound(arm) -> None:
         arm: `Arm`, whose numbers are as `as_numbers` gives them.
 
     Raises:
-        InvalidInputError: gravity, the model, a limit, friction, home or skin is not finite, a mass or friction is
+        InvalidInputError: gravity, the model, a limit, friction, home or surface is not finite, a mass or friction is
             negative, or a joint's range is empty.
     """
     _refuse_unsound_model(arm)
@@ -78,8 +78,8 @@ def refuse_unsound(arm) -> None:
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
-    if not np.isfinite(arm.skin).all():
-        raise InvalidInputError(f"skin of arm '{arm.name}' has a number that is not finite; give finite points")
+    if not np.isfinite(arm.surface).all():
+        raise InvalidInputError(f"surface of arm '{arm.name}' has a number that is not finite; give finite points")
     if not 0.0 <= arm.lever_doubted < np.inf:
         raise InvalidInputError(f"lever_doubted = {arm.lever_doubted:g} m; give a finite number from 0 on")
 

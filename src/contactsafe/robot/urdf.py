@@ -1,4 +1,4 @@
-"""URDF generated from an arm's facts, for tools that do not read MJCF: Pinocchio, TRAC-IK, RViz, MoveIt."""
+"""URDF generated from an arm's description, for tools that do not read MJCF: Pinocchio, TRAC-IK, RViz, MoveIt."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from contactsafe.core.rotation import quat_to_matrix
-from contactsafe.robot.facts import ArmFacts, Capsule, Inertia, Joint, Tool
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Tool
 from contactsafe.robot.mjcf import numbers
 
 BASE_LINK = "base"
@@ -14,27 +14,27 @@ TIP_LINK = "tcp"
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def arm_urdf(facts: ArmFacts, tool: Tool) -> str:
+def arm_urdf(description: ArmDescription, tool: Tool) -> str:
     """Write the arm with its tool, base frame at the origin.
 
     Links are `link0` … `link<n>` and `tool`, and the frames without mass `base`, the root, and `tcp`; joints are
     `joint1` … `joint<n>`, and the fixed `base_mount`, `tool_mount` and `tcp_mount`. URDF has no capsule, so each is a
-    cylinder and two spheres. URDF has no tag for rotor inertia either: add `facts.joint_array("armature")` to the
+    cylinder and two spheres. URDF has no tag for rotor inertia either: add `description.joint_array("armature")` to the
     diagonal of an inertia matrix computed from this text, or it will not be the MJCF's. Joint friction is left out
     too, for URDF's model of it is another one.
 
     Args:
-        facts: the arm.
+        description: the arm.
         tool: what its flange carries.
 
     Returns:
         XML text; lengths in m, angles in rad, masses in kg.
     """
-    robot = ET.Element("robot", name=facts.name)
+    robot = ET.Element("robot", name=description.name)
     ET.SubElement(robot, "link", name=BASE_LINK)  # KDL, under TRAC-IK, takes no root link with mass
-    _link(robot, "link0", facts.base, facts.base_capsules)
+    _link(robot, "link0", description.base, description.base_capsules)
     _joint(robot, "base_mount", "fixed", (BASE_LINK, "link0"), (0.0, 0.0, 0.0), _UPRIGHT)
-    for index, link in enumerate(facts.links, start=1):
+    for index, link in enumerate(description.links, start=1):
         _link(robot, f"link{index}", link.inertia, link.capsules)
         joint = _joint(
             robot, f"joint{index}", "revolute", (f"link{index - 1}", f"link{index}"), link.position, link.quat
@@ -45,7 +45,14 @@ def arm_urdf(facts: ArmFacts, tool: Tool) -> str:
     if tool.pad_half_size is not None:
         centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.pad_half_size[2])
         _collision(mount, centre, (0.0, 0.0, 0.0), "box", size=numbers(2 * half for half in tool.pad_half_size))
-    _joint(robot, "tool_mount", "fixed", (f"link{len(facts.links)}", "tool"), facts.mount_position, facts.mount_quat)
+    _joint(
+        robot,
+        "tool_mount",
+        "fixed",
+        (f"link{len(description.links)}", "tool"),
+        description.mount_position,
+        description.mount_quat,
+    )
     ET.SubElement(robot, "link", name=TIP_LINK)
     _joint(robot, "tcp_mount", "fixed", ("tool", TIP_LINK), tool.tcp, _UPRIGHT)
     ET.indent(robot)

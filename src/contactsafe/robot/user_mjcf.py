@@ -18,8 +18,8 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.arm import Arm, finite_array, finite_range
 from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
-from contactsafe.robot.facts import Inertia
-from contactsafe.robot.skin import geom_skin
+from contactsafe.robot.description import Inertia
+from contactsafe.robot.surface import geom_surface
 
 _BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
@@ -47,7 +47,7 @@ def from_mjcf(
 
     The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
     of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
-    Base pose, gravity and rotor inertia are the model's. The skin is what the colliding geoms of links 2 … n show, or
+    Base pose, gravity and rotor inertia are the model's. Its surface is that of the colliding geoms of links 2 … n, or
     all geoms of a link where none collides, without what the last link carries. Damping, dry friction and springs of
     joints are left out: the controller feels them as external torque, so give `friction`, or keep them below its
     threshold.
@@ -65,8 +65,8 @@ def from_mjcf(
         home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
 
     Returns:
-        An arm without facts and tool; a joint without limits has the range ±inf, and speed limits, which MJCF does
-        not know, are inf.
+        An arm without description and tool; a joint without limits has the range ±inf, and speed limits, which MJCF
+        does not know, are inf.
 
     Raises:
         InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
@@ -98,7 +98,7 @@ def from_mjcf(
         torque_rate_max=float(torque_rate_max),
         friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
         home=_home(key_home if home is None else home, q_min, q_max),
-        skin=geom_skin(model, data, _shown_by(model, chain), data.xanchor[chain]),
+        surface=geom_surface(model, data, _shown_by(model, chain), data.xanchor[chain]),
         lever_doubted=_LEVER_DOUBTED,
     )
 
@@ -184,7 +184,7 @@ def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
 
 
 def _shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    """Tell whose skin each body's surface is, (nbody,): its link's, but what the last link carries is tool, 0.
+    """Tell whose surface each body's surface is, (nbody,): its link's, but what the last link carries is tool, 0.
 
     Only where the last link's own body shows nothing, what it carries is taken for the link.
     """

@@ -1,4 +1,4 @@
-"""One arm before one whiteboard in PyBullet: a second engine, from the same facts through the URDF.
+"""One arm before one whiteboard in PyBullet: a second engine, from the same description through the URDF.
 
 Bullet knows no rotor inertia at a joint, so the rotors are there themselves: small flywheels on the link before each
 joint, geared to it so high that they hardly feel the link's own turning. A motor's torque then accelerates the arm as
@@ -16,7 +16,7 @@ from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.files import readable
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.facts import ArmFacts, Tool
+from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.mjcf import numbers
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
@@ -62,23 +62,23 @@ def import_pybullet() -> Any:
     return pybullet
 
 
-def bullet_urdf(facts: ArmFacts, tool: Tool) -> str:
+def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
     """Write the arm for Bullet: the project's URDF, with rotors as links and the pad as a link of its own.
 
     Args:
-        facts: the arm.
+        description: the arm.
         tool: what its flange carries.
 
     Returns:
         XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` …, massless but for what
         `BulletPlant` gives them, and `pad`, fixed to the tool.
     """
-    robot = ET.fromstring(arm_urdf(facts, replace(tool, pad_half_size=None)))
+    robot = ET.fromstring(arm_urdf(description, replace(tool, pad_half_size=None)))
     for link in robot.iter("link"):
         if link.get("name") in (BASE_LINK, TIP_LINK):
             _inertial(link, 0.0)  # left out, Bullet would take 1 kg
     origins = {joint.get("name"): joint.find("origin") for joint in robot.iter("joint")}
-    for index in range(1, len(facts.links) + 1):
+    for index in range(1, len(description.links) + 1):
         _inertial(ET.SubElement(robot, "link", name=f"rotor{index}"), _ROTOR_KG)
         rotor = ET.SubElement(robot, "joint", name=f"rotor_joint{index}", type="continuous")
         _connect(rotor, origins[f"joint{index}"], f"link{index - 1}", f"rotor{index}")
@@ -113,7 +113,7 @@ class BulletPlant(Unique):
     """Arm, table and board in a PyBullet client of their own.
 
     Args:
-        arm: built from facts, with a tool.
+        arm: built from a description, with a tool.
         config: plant errors, board; obstacles are not built.
         tick_s: time step, s.
 
@@ -123,7 +123,7 @@ class BulletPlant(Unique):
         contacts: array of `contact_dtype` records, of which the first `n_contacts` are in force.
 
     Raises:
-        InvalidInputError: pybullet is not installed, the arm has no facts, or obstacles are asked for.
+        InvalidInputError: pybullet is not installed, the arm has no description, or obstacles are asked for.
     """
 
     _why = (
@@ -133,16 +133,16 @@ class BulletPlant(Unique):
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()
-        if arm.facts is None or arm.tool is None:
+        if arm.description is None or arm.tool is None:
             raise InvalidInputError(
-                f"arm '{arm.name}' has no facts to build a plant from; give contactsafe.robots.panda()"
+                f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda()"
             )
         if config.obstacles:
             raise InvalidInputError(
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
             )
         self._config, self._tick_s, self._n = config, tick_s, arm.n
-        self._facts = perturbed(arm.facts, config.plant)
+        self._facts = perturbed(arm.description, config.plant)
         self._urdf = bullet_urdf(self._facts, loaded(arm.tool, config.plant))
         self._client = self._bullet.connect(self._bullet.DIRECT)
         # Ends it once, for PyBullet gives the number of a client that has ended to the next.

@@ -16,7 +16,7 @@ from contactsafe.core.native import mj_comPos, mj_jac, mj_kinematics, view1
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.bullet import BulletPlant
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.stepping import act, begin_report, end_tick, sense, tool_position, tool_rotation
+from contactsafe.sim.stepping import act, begin_step_metrics, end_tick, sense, tool_position, tool_rotation
 from contactsafe.sim.world import TICK_S, Worlds
 
 
@@ -58,7 +58,7 @@ class BulletWorlds(Worlds):
     def run(self, ticks, trace: np.ndarray | None = None) -> None:
         """Run control ticks in every world; see `Worlds.run`."""
         ticks = self._checked(ticks, trace)
-        noise = self.draw_noise()
+        noise = self.sample_noise()
         traces = self.no_trace if trace is None else trace
         for i, bullet in enumerate(self.bullets):
             _begin(self.reports, i, ticks[i])
@@ -76,7 +76,7 @@ class BulletWorlds(Worlds):
 
 @compiled(nogil=True)
 def _begin(reports, i, ticks):
-    begin_report(reports[i], ticks)
+    begin_step_metrics(reports[i], ticks)
 
 
 @compiled(nogil=True)

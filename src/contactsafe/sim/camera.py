@@ -21,7 +21,7 @@ from contactsafe.sim.whiteboard import Whiteboard
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
-_MOST_CELLS, _MOST_ROWS = 2**16 - 1, 2**15 - 1  # what the counts and numbers of a `Ledger` hold
+_MOST_CELLS, _MOST_ROWS = 2**16 - 1, 2**15 - 1  # what the counts and numbers of a `InkIndex` hold
 
 
 def camera_axes(camera: Camera) -> np.ndarray:
@@ -167,12 +167,12 @@ def render_mask(camera, cells, plant, out):
     listed = np.empty((cells.size, 2), dtype=np.int16)
     shown = np.empty(out.shape, dtype=np.uint16)
     count_shown(camera.pixels, listed[: list_cells(cells, listed)], shown)
-    draw_mask(camera, shown, plant, out)
+    render_mask_into(camera, shown, plant, out)
 
 
 @compiled(nogil=True)
-def draw_mask(camera, shown, plant, out):
-    """Draw a mask from what a `Ledger` keeps.
+def render_mask_into(camera, shown, plant, out):
+    """Draw a mask from what a `InkIndex` keeps.
 
     Args:
         camera: `CameraTables`.

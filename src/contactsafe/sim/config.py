@@ -144,7 +144,7 @@ class Obstacle:
         mass: kg.
         damping_ratio: of spring and mass.
         half_length: of a standing cylinder, m; 0 for a sphere.
-        surface_s: time constant of MuJoCo's contact, s: the larger, the softer its skin (0.02 is MuJoCo's default).
+        surface_s: time constant of MuJoCo's contact, s: the larger, the softer its surface (0.02 is MuJoCo's default).
         travel: way that its hold moves, world, m.
         travel_s: when it sets off and when it arrives, s since reset.
         travel_until_n: its hold stops for good once it presses this hard on the arm, N; inf to go all the way.

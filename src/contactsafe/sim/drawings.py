@@ -10,7 +10,7 @@ from contactsafe.sim.whiteboard import Whiteboard
 
 Boards = Literal["strokes", "digits", "text", "handwriting"]
 BOARDS: tuple[str, ...] = get_args(Boards)
-"""Names of the kinds: `Whiteboard.draw_random`'s strokes, people's digits, words, and lines of either."""
+"""Names of the kinds: `Whiteboard.sample_random`'s strokes, people's digits, words, and lines of either."""
 
 _PEN_M = (0.0025, 0.004)  # radius of the pen's line, m
 _LINE = 1.6  # from line to line, in heights of a capital
@@ -26,7 +26,7 @@ def check_boards(kind: str) -> None:
         raise InvalidInputError(f"boards = {kind!r}; choose {', '.join(BOARDS[:-1])} or {BOARDS[-1]}")
 
 
-def draw_board(board: Whiteboard, kind: str, rng: np.random.Generator) -> None:
+def paint_board(board: Whiteboard, kind: str, rng: np.random.Generator) -> None:
     """Draw on a board, upright as its camera sees it.
 
     Args:
@@ -39,7 +39,7 @@ def draw_board(board: Whiteboard, kind: str, rng: np.random.Generator) -> None:
     """
     check_boards(kind)
     if kind == "strokes":
-        board.draw_random(rng)
+        board.sample_random(rng)
     else:
         board.draw(_written(_page(kind, rng), board.config.ink_size, board.config.cell, rng))
 

@@ -14,7 +14,7 @@ from contactsafe.core.compiled import compiled
 from contactsafe.sim.whiteboard import CLEAN, INK
 
 
-class Ledger(NamedTuple):
+class InkIndex(NamedTuple):
     """What lies on N boards, as it was when they were last entered, less what was wiped until they were last looked at.
 
     Attributes:
@@ -28,9 +28,9 @@ class Ledger(NamedTuple):
     shown: np.ndarray
 
 
-def empty_ledger(n: int, cells: int, size: int) -> Ledger:
-    """Make a `Ledger` of n clean boards of so many cells, seen by cameras of size × size pixels."""
-    return Ledger(
+def empty_ink_index(n: int, cells: int, size: int) -> InkIndex:
+    """Make a `InkIndex` of n clean boards of so many cells, seen by cameras of size × size pixels."""
+    return InkIndex(
         cells=np.zeros((n, cells, 2), dtype=np.int16),
         entries=np.zeros(n, dtype=np.int64),
         shown=np.zeros((n, size, size), dtype=np.uint16),
@@ -38,32 +38,32 @@ def empty_ledger(n: int, cells: int, size: int) -> Ledger:
 
 
 @compiled(nogil=True)
-def enter(ledger, i, cells, pixels):
+def enter(ink_index, i, cells, pixels):
     """Enter board i as it is now.
 
     Args:
-        ledger: `Ledger`; updated.
+        ink_index: `InkIndex`; updated.
         i: which board.
         cells: the board's, uint8, (rows, columns).
         pixels: of the camera that looks at it, see `CameraTables`.
     """
-    ledger.entries[i] = list_cells(cells, ledger.cells[i])
-    count_shown(pixels, ledger.cells[i, : ledger.entries[i]], ledger.shown[i])
+    ink_index.entries[i] = list_cells(cells, ink_index.cells[i])
+    count_shown(pixels, ink_index.cells[i, : ink_index.entries[i]], ink_index.shown[i])
 
 
 @compiled
-def strike_out(ledger, i, cells, pixels):
+def remove_erased(ink_index, i, cells, pixels):
     """Take out of board i's entries what has been wiped since; arguments as for `enter`."""
-    listed, shown = ledger.cells[i], ledger.shown[i]
+    listed, shown = ink_index.cells[i], ink_index.shown[i]
     kept = 0
-    for m in range(ledger.entries[i]):
+    for m in range(ink_index.entries[i]):
         row, column = listed[m, 0], listed[m, 1]
         if cells[row, column] == CLEAN:
             _add(shown, pixels, row, column, -1)
         else:
             listed[kept, 0], listed[kept, 1] = row, column
             kept += 1
-    ledger.entries[i] = kept
+    ink_index.entries[i] = kept
 
 
 @compiled
@@ -95,11 +95,11 @@ def _add(shown, pixels, row, column, number):
 
 
 @compiled(nogil=True)
-def nearest_ink(ledger, i, cells, origin, cell, position):
+def nearest_ink(ink_index, i, cells, origin, cell, position):
     """Count the ink and find how far the nearest of it lies from a point along the board.
 
     Args:
-        ledger: `Ledger`.
+        ink_index: `InkIndex`.
         i: which board.
         cells: the board's, uint8, (rows, columns).
         origin: world corner of cell (0, 0), (2,), m.
@@ -109,11 +109,11 @@ def nearest_ink(ledger, i, cells, origin, cell, position):
     Returns:
         Number of ink cells; distance, m, 0 where there is none.
     """
-    listed = ledger.cells[i]
+    listed = ink_index.cells[i]
     count = 0
     best = math.inf
     px, py = (position[0] - origin[0]) / cell - 0.5, (position[1] - origin[1]) / cell - 0.5
-    for m in range(ledger.entries[i]):
+    for m in range(ink_index.entries[i]):
         row, column = listed[m, 0], listed[m, 1]
         if cells[row, column] == INK:
             count += 1

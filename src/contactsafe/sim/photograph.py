@@ -80,7 +80,7 @@ class Conditions:
     shift: tuple[float, float]
 
 
-def draw_conditions(rng: np.random.Generator, severity: float | None = None) -> Conditions:
+def sample_conditions(rng: np.random.Generator, severity: float | None = None) -> Conditions:
     """Draw the conditions of an episode.
 
     Args:
@@ -195,7 +195,7 @@ class Photographer(Independent):
             uint8, (455, 455, 3), red, green and blue.
         """
         if self._scene is None or self._scene.seed != seed:
-            self._scene = self._compose(seed, draw_conditions(np.random.default_rng(seed)))
+            self._scene = self._compose(seed, sample_conditions(np.random.default_rng(seed)))
         return self._expose(self._scene, cells, solids, number)
 
     def take_under(

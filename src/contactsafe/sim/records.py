@@ -53,7 +53,7 @@ def plant_dtype(n: int) -> np.dtype:
             ("q_sigma", _f),
             ("qd_sigma", _f),
             ("encoder_step", _f),  # rad; 0 for none
-            ("velocity_share", _f),  # of the difference quotient, a tick; 0 for the plant's own velocity
+            ("velocity_filter_gain", _f),  # of the difference quotient, a tick; 0 for the plant's own velocity
             ("q_seen", _f, (n,)),  # last measured positions, rad
             ("qd_seen", _f, (n,)),  # last measured velocities, rad/s
             ("torque_sigma", _f),
@@ -93,7 +93,7 @@ def plant_bounds(bodies: int, cameras: int) -> dict[str, tuple[float, float]]:
     }
 
 
-report_dtype = np.dtype(
+step_metrics_dtype = np.dtype(
     [
         ("tool_force_mean", _f),  # of the ticks, |pad force| by the simulator, N
         ("tool_force_peak", _f),  # N
@@ -125,7 +125,7 @@ def trace_dtype(n: int) -> np.dtype:
             ("obstacle_position", _f, (MAX_OBSTACLES, 3)),  # m
             ("tau_arm", _f, (n,)),  # true external torque less the pad's, N m
             ("residual", _f, (n,)),  # N m
-            ("residual_trigger", _f, (n,)),  # N m
+            ("residual_fast", _f, (n,)),  # N m
             ("mode", _i),
             ("holding", _i),
             ("link", _i),
@@ -164,7 +164,7 @@ def fill_plant(plant, model: mujoco.MjModel, arm: Arm, config: WorldConfig) -> N
     sensors = config.sensors
     plant["encoder_step"] = sensors.encoder_step_rad
     if math.isfinite(sensors.velocity_filter_hz):
-        plant["velocity_share"] = observer_gain(2 * math.pi * sensors.velocity_filter_hz, model.opt.timestep)
+        plant["velocity_filter_gain"] = observer_gain(2 * math.pi * sensors.velocity_filter_hz, model.opt.timestep)
     for field, value in (
         ("q_sigma", sensors.q_rad), ("qd_sigma", sensors.qd_rad_s), ("torque_sigma", sensors.torque_nm),
         ("force_sigma", sensors.force_n), ("moment_sigma", sensors.moment_nm),

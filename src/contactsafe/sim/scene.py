@@ -9,7 +9,7 @@ import mujoco
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.facts import ArmFacts, Inertia, Tool
+from contactsafe.robot.description import ArmDescription, Inertia, Tool
 from contactsafe.robot.mjcf import FLANGE_SITE, arm_body, model_root, numbers
 from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, WorldConfig, per_joint
 
@@ -25,24 +25,26 @@ BOARD_HALF_THICKNESS = 0.005
 
 
 def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
-    """Compile the world around an arm that was built from facts.
+    """Compile the world around an arm that was built from a description.
 
     Raises:
-        InvalidInputError: the arm has no facts to build a plant from.
+        InvalidInputError: the arm has no description to build a plant from.
     """
     return mujoco.MjModel.from_xml_string(scene_mjcf(arm, config))
 
 
 def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     """Write the MJCF of the world around an arm."""
-    if arm.facts is None or arm.tool is None:
-        raise InvalidInputError(f"arm '{arm.name}' has no facts to build a plant from; give contactsafe.robots.panda()")
+    if arm.description is None or arm.tool is None:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda()"
+        )
     root = model_root("contactsafe world")
     _visual(root)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0.6 -0.6 2", dir="0 0.3 -1", diffuse="0.7 0.7 0.7")
     _board(world, config.board)
-    world.append(arm_body(perturbed(arm.facts, config.plant), loaded(arm.tool, config.plant)))
+    world.append(arm_body(perturbed(arm.description, config.plant), loaded(arm.tool, config.plant)))
     _camera(world, config)
     for index, obstacle in enumerate(config.obstacles):
         _obstacle(world, index, obstacle)
@@ -62,14 +64,14 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def perturbed(facts: ArmFacts, plant: PlantConfig) -> ArmFacts:
-    """Give the facts of an arm whose links weigh something else than the controller believes."""
-    scales = per_joint(plant.inertia_scale, len(facts.links), "inertia_scale")
+def perturbed(description: ArmDescription, plant: PlantConfig) -> ArmDescription:
+    """Give the description of an arm whose links weigh something else than the controller believes."""
+    scales = per_joint(plant.inertia_scale, len(description.links), "inertia_scale")
     links = tuple(
         replace(link, inertia=_scaled(link.inertia, float(scale)))
-        for link, scale in zip(facts.links, scales, strict=True)
+        for link, scale in zip(description.links, scales, strict=True)
     )
-    return replace(facts, links=links)
+    return replace(description, links=links)
 
 
 def _scaled(inertia: Inertia, scale: float) -> Inertia:

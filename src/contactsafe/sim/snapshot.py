@@ -43,7 +43,7 @@ MEASURE = (-1e9, 1e9)
 """Bounds of numbers with a unit: what is beyond is no state of a simulation, but overflows somewhere."""
 
 
-class _SnapshotError(InvalidInputError):
+class _StateError(InvalidInputError):
     """A value that cannot be put back, and the names of the parts it lies in."""
 
     def __init__(self, what: str, *path: str):
@@ -76,12 +76,12 @@ def check(parts: Parts, snapshot: Mapping[str, Any]) -> None:
     """
     if not isinstance(snapshot, Mapping) or set(parts) != set(snapshot):
         found = ", ".join(sorted(map(str, snapshot))) if isinstance(snapshot, Mapping) else shown(snapshot)
-        raise _SnapshotError(f"{found[:160]}, not {', '.join(sorted(parts))[:160]}")
+        raise _StateError(f"{found[:160]}, not {', '.join(sorted(parts))[:160]}")
     for name, part in parts.items():
         try:
             part.check(snapshot[name])
-        except _SnapshotError as error:
-            raise _SnapshotError(error.what, name, *error.path) from None
+        except _StateError as error:
+            raise _StateError(error.what, name, *error.path) from None
 
 
 def of_object(owner: Any) -> Part:
@@ -136,7 +136,7 @@ def of_generators(generators: list[np.random.Generator]) -> Part:
 
     def check_states(states: Sequence[dict]) -> None:
         if not isinstance(states, list) or len(states) not in (len(generators) or len(states), 0):
-            raise _SnapshotError(f"{shown(states)} for {len(generators)} random generators")
+            raise _StateError(f"{shown(states)} for {len(generators)} random generators")
         for state in states:
             _generator(state)
 
@@ -159,7 +159,7 @@ def of_physics(models: Sequence[mujoco.MjModel], datas: Sequence[mujoco.MjData])
 
     def check_values(values: Sequence[Mapping[str, np.ndarray]]) -> None:
         if not isinstance(values, list) or len(values) != len(datas):
-            raise _SnapshotError(f"{shown(values)} for the physics of {len(datas)} worlds")
+            raise _StateError(f"{shown(values)} for the physics of {len(datas)} worlds")
         for model, data, value in zip(models, datas, values, strict=True):
             check({name: of_array(array) for name, array in _physics(model, data).items()}, value)
 
@@ -200,12 +200,12 @@ def _check_array(array: np.ndarray, value: np.ndarray, low: float, high: float) 
         found = f"an array {value.shape}" if isinstance(value, np.ndarray) else shown(value)
         raise InvalidInputError(f"the snapshot holds {found} for one of {array.shape}; start anew")
     if value.dtype != array.dtype:
-        raise _SnapshotError(f"{value.dtype} for {array.dtype}")
+        raise _StateError(f"{value.dtype} for {array.dtype}")
     # A truth is a byte, in which compiled code may find nothing but 0 and 1; NaN is outside whatever the bounds are.
     numbers, most = (value.view(np.uint8), 1) if array.dtype.kind == "b" else (value, high)
     outside = ~((numbers >= low) & (numbers <= most))
     if outside.any():
-        raise _SnapshotError(f"{shown(value[outside][0].item())}, which cannot be")
+        raise _StateError(f"{shown(value[outside][0].item())}, which cannot be")
 
 
 def _without_inf(value: Any) -> Any:
@@ -215,7 +215,7 @@ def _without_inf(value: Any) -> Any:
 
 def _check_same(array: np.ndarray, value: np.ndarray) -> None:
     if not np.array_equal(array, value):
-        raise _SnapshotError("what was made otherwise")
+        raise _StateError("what was made otherwise")
 
 
 def _plain(value: Any) -> Any:
@@ -230,5 +230,5 @@ def _generator(state: dict[str, Any]) -> np.random.Generator:
         bits = {"PCG64": np.random.PCG64, "SFC64": np.random.SFC64}[state["bit_generator"]]()
         bits.state = state
     except (KeyError, TypeError, ValueError, OverflowError):
-        raise _SnapshotError(f"{shown(state)}, which is not the state of a random generator") from None
+        raise _StateError(f"{shown(state)}, which is not the state of a random generator") from None
     return np.random.Generator(bits)

@@ -25,10 +25,10 @@ def run_ticks(plant, controller, cells, noise, ticks, report, trace):
         cells: the board's, uint8, (rows, columns).
         noise: standard normal numbers, (at least ticks, `noise_channels`).
         ticks: how many.
-        report: `report_dtype` record; overwritten.
+        report: `step_metrics_dtype` record; overwritten.
         trace: array of `trace_dtype` records, one a tick, or an empty one.
     """
-    begin_report(report, ticks)
+    begin_step_metrics(report, ticks)
     for k in range(ticks):
         sense(plant, controller, noise[k])
         control_tick(controller)
@@ -39,7 +39,7 @@ def run_ticks(plant, controller, cells, noise, ticks, report, trace):
 
 
 @compiled
-def begin_report(report, ticks):
+def begin_step_metrics(report, ticks):
     """Begin to report on so many ticks."""
     report.tool_force_mean, report.tool_force_peak, report.contact_ticks = 0.0, 0.0, 0
     report.obstacle_force_peak, report.arm_touched, report.erased = 0.0, 0, 0
@@ -66,9 +66,9 @@ def sense(plant, controller, noise):
         if plant.encoder_step > 0.0:
             q = plant.encoder_step * math.floor(q / plant.encoder_step + 0.5)
         qd = qvel[i] + plant.qd_sigma * noise[n + i]
-        if plant.velocity_share > 0.0:
+        if plant.velocity_filter_gain > 0.0:
             rate = 0.0 if plant.tick == 0 else (q - plant.q_seen[i]) / controller.params.dt
-            qd = plant.qd_seen[i] + plant.velocity_share * (rate - plant.qd_seen[i])
+            qd = plant.qd_seen[i] + plant.velocity_filter_gain * (rate - plant.qd_seen[i])
         plant.q_seen[i], plant.qd_seen[i] = q, qd
         measurement.q[i], measurement.qd[i] = q, qd
     _sense_wrench(plant, controller, noise[3 * n :])
@@ -226,7 +226,7 @@ def _record(plant, controller, row):
     row.D_task[:] = controller.state.D_task
     row.wrench_ee[:] = controller.measurement.wrench_ee
     row.residual[:] = out.residual
-    row.residual_trigger[:] = out.residual_trigger
+    row.residual_fast[:] = out.residual_fast
     row.mode, row.holding, row.link = out.mode, out.holding, out.link
     pad_force(plant, row.tool_force)
     row.obstacle_force = obstacle_force(plant)

@@ -39,7 +39,7 @@ class Variation(Independent):
         self._plants = [_Plant(worlds, i) for i in range(worlds.n)]
         # Their places are the same in every run: a run that goes on must find them again.
         rng = np.random.default_rng(0)
-        cameras = [_knocked(worlds.config.camera, ranges, rng) for _ in range(CAMERAS)]
+        cameras = [_perturbed(worlds.config.camera, ranges, rng) for _ in range(CAMERAS)]
         worlds.cameras = stack_cameras([camera_tables(c, worlds.boards[0], worlds.models[0]) for c in cameras])
         self._frames = np.full((worlds.n, MAX_DELAY_STEPS + 1, *worlds.masks.shape[1:]), OTHER_PIXEL, dtype=np.uint8)
         self._newest = np.zeros(worlds.n, dtype=np.int64)
@@ -57,7 +57,7 @@ class Variation(Independent):
 
     def look_first(self, i: int) -> None:
         """The same, as if what is seen had been there for long."""
-        _spoil(self._worlds.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
+        _corrupt(self._worlds.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
         self._frames[i] = self._worlds.masks[i]
 
     def parts(self) -> dict[str, Part]:
@@ -102,7 +102,7 @@ class Variation(Independent):
         self._plants[i].apply(self.drawn[i])
 
 
-def _knocked(camera: Camera, ranges: Randomisation, rng: np.random.Generator) -> Camera:
+def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) -> Camera:
     """Draw where a camera really stands and looks; turning it moves what it looks at."""
     moved, turned = rng.uniform(*ranges.camera_m, 3), rng.uniform(*ranges.camera_rad, 3)
     position = np.array(camera.position) + moved
@@ -144,7 +144,7 @@ class _Plant:
 @compiled(nogil=True)
 def _look(start, stop, drawn, masks, frames, newest, random):
     for i in range(start, stop):
-        _spoil(masks[i], drawn[i : i + 1], random[i : i + 1])
+        _corrupt(masks[i], drawn[i : i + 1], random[i : i + 1])
         count = frames.shape[1]
         newest[i] = (newest[i] + 1) % count
         copy_picture(masks[i], frames[i, newest[i]])
@@ -153,7 +153,7 @@ def _look(start, stop, drawn, masks, frames, newest, random):
 
 
 @compiled(nogil=True)
-def _spoil(mask, drawn, random):
+def _corrupt(mask, drawn, random):
     """Miss some ink pixels of a mask and invent others."""
     missed, invented = drawn[0].ink_missed, drawn[0].ink_invented
     flat = mask.reshape(-1)

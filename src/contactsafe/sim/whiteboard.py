@@ -65,12 +65,12 @@ class Whiteboard(Independent):
         area[:] = np.where(drawing[np.ix_(index, index)] != 0, INK, CLEAN)
         self.changed = True
 
-    def draw_random(self, rng: np.random.Generator) -> None:
+    def sample_random(self, rng: np.random.Generator) -> None:
         """Draw one to four strokes and up to two blobs somewhere in the ink area."""
         size = self._ink_rows.stop - self._ink_rows.start
         drawing = np.zeros((size, size), dtype=np.uint8)
         for _ in range(rng.integers(1, 5)):
-            _draw_stroke(drawing, rng, self.config.cell)
+            _paint_stroke(drawing, rng, self.config.cell)
         for _ in range(rng.integers(0, 3)):
             centre = rng.uniform(0.1, 0.9, 2) * size
             _stamp(drawing, centre[0], centre[1], rng.uniform(0.006, 0.016) / self.config.cell)
@@ -91,7 +91,7 @@ class Whiteboard(Independent):
         self.changed = True
 
 
-def _draw_stroke(drawing: np.ndarray, rng: np.random.Generator, cell: float) -> None:
+def _paint_stroke(drawing: np.ndarray, rng: np.random.Generator, cell: float) -> None:
     """Draw a smooth random walk of the pen: 8 to 28 cm long, 6 to 12 mm wide."""
     size = drawing.shape[0]
     radius = rng.uniform(0.003, 0.006) / cell

@@ -16,14 +16,14 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.ink import empty_ledger, enter
+from contactsafe.sim.ink import empty_ink_index, enter
 from contactsafe.sim.records import (
     fill_plant,
     noise_channels,
     plant_bounds,
     plant_dtype,
     point_plant,
-    report_dtype,
+    step_metrics_dtype,
     trace_dtype,
 )
 from contactsafe.sim.scene import build_plant
@@ -86,7 +86,7 @@ class Worlds(Independent):
     A copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
-        arm: built from facts, with a tool.
+        arm: built from a description, with a tool.
         world: plant, sensors, board, camera, obstacles; one for all, or one for each (same board and camera).
         controller: a preset or another configuration, the same for all.
         n: how many.
@@ -95,14 +95,14 @@ class Worlds(Independent):
         shared: whether worlds alike share a model; false where each is changed from episode to episode.
 
     Attributes:
-        plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `report_dtype` records, (n,).
+        plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `step_metrics_dtype` records, (n,).
         cells: the boards, uint8, (n, rows, columns).
         boards: `Whiteboard` objects whose cells lie in `cells`.
         masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
         camera: `CameraTables` as calibrated.
         cameras: those that look, side by side; `plants["camera"]` says which one at which world.
-        ledger: `Ledger` of the boards and the cameras that look at them; `enter_changed` brings it up to date with what
-            was drawn, tasks with what was wiped.
+        ink_index: `InkIndex` of the boards and the cameras that look at them; `enter_changed` brings it up to date
+            with what was drawn, tasks with what was wiped.
         homography: of board plane to mask pixels, (3, 3).
         no_trace: an empty trace, for `run_worlds` and its like.
     """
@@ -127,7 +127,7 @@ class Worlds(Independent):
         self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
         self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
         self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
-        self.reports = np.zeros(n, dtype=report_dtype)
+        self.reports = np.zeros(n, dtype=step_metrics_dtype)
         self._owners = [Controller(arm, controller, self.controllers, i) for i in range(n)]
         self._bind()
         for i in range(n):
@@ -137,7 +137,7 @@ class Worlds(Independent):
         self.masks = np.full((n, size, size), 255, dtype=np.uint8)
         self.camera = camera_tables(self.config.camera, self.boards[0], self.models[0])
         self.cameras = stack_cameras([self.camera])
-        self.ledger = empty_ledger(n, self.boards[0].cells.size, size)
+        self.ink_index = empty_ink_index(n, self.boards[0].cells.size, size)
         self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
@@ -198,7 +198,7 @@ class Worlds(Independent):
 
     def enter_ink(self, i: int) -> None:
         """Take down what lies on board i and where its camera shows it: it was drawn on, or the camera changed."""
-        enter(self.ledger, i, self.cells[i], self.cameras.pixels[self.plants[i]["camera"]])
+        enter(self.ink_index, i, self.cells[i], self.cameras.pixels[self.plants[i]["camera"]])
         self.boards[i].changed = False
 
     def enter_changed(self) -> None:
@@ -243,7 +243,7 @@ class Worlds(Independent):
         """Stop the threads."""
         self._threads.close()
 
-    def draw_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
+    def sample_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Draw the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
         for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
             rng.standard_normal(out=noise)
@@ -273,7 +273,7 @@ class Worlds(Independent):
         traces = self.no_trace if trace is None else trace
 
         def share(start: int, stop: int) -> None:
-            noise = self.draw_noise(start, stop)
+            noise = self.sample_noise(start, stop)
             run_worlds(
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces
             )  # fmt: skip

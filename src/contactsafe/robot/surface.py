@@ -1,4 +1,4 @@
-"""The skin of an arm: points of its surface where something may touch it, and the way that thing can push there."""
+"""The surface of an arm: points of its surface where something may touch it, and the way that thing can push there."""
 
 import copy
 import math
@@ -6,9 +6,9 @@ import math
 import mujoco
 import numpy as np
 
-from contactsafe.robot.facts import ArmFacts, Capsule
+from contactsafe.robot.description import ArmDescription, Capsule
 
-SKIN_COLUMNS = 7
+SURFACE_COLUMNS = 7
 """Link 1 … n, point x y z in the link's frame, m, outward normal x y z."""
 
 _ALONG, _AROUND = 5, 12
@@ -23,14 +23,14 @@ _TURN_M = 0.02
 """Points whose normals differ by 1 count as so far apart: a thin plate has two sides."""
 
 
-def capsule_skin(facts: ArmFacts) -> np.ndarray:
-    """Sample the capsules of an arm's links, (P, 7) rows as in `SKIN_COLUMNS`.
+def capsule_surface(description: ArmDescription) -> np.ndarray:
+    """Sample the capsules of an arm's links, (P, 7) rows as in `SURFACE_COLUMNS`.
 
     Link 1 is left out: what touches it can only turn it about its own axis, and joint torques show next to nothing.
     """
     rows = [
         _capsule_points(index, capsule)
-        for index, link in enumerate(facts.links, start=1)
+        for index, link in enumerate(description.links, start=1)
         if index > 1
         for capsule in link.capsules
     ]
@@ -51,11 +51,11 @@ def _capsule_points(link: int, capsule: Capsule) -> np.ndarray:
     return np.array(rows)
 
 
-def geom_skin(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray, origins: np.ndarray) -> np.ndarray:
-    """Sample the geoms of an arm's links in a scene, (P, 7) rows as in `SKIN_COLUMNS`; P is at most 480.
+def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray, origins: np.ndarray) -> np.ndarray:
+    """Sample the geoms of an arm's links in a scene, (P, 7) rows as in `SURFACE_COLUMNS`; P is at most 480.
 
     Of each link those geoms that can collide, or all of them where none can. A link without geoms has no points, and
-    link 1 is left out as in `capsule_skin`.
+    link 1 is left out as in `capsule_surface`.
 
     Args:
         model: of the scene.
@@ -72,7 +72,7 @@ def geom_skin(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray, o
         points = _surface(seen, data, solid if solid.size else geoms)
         if len(points):
             found[link] = points
-    rows = [np.zeros((0, SKIN_COLUMNS))]
+    rows = [np.zeros((0, SURFACE_COLUMNS))]
     for link, points in found.items():
         points = _spread(points, _POINTS // len(found))
         points[:, :3] -= origins[link - 1]

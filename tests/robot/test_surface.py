@@ -1,4 +1,4 @@
-"""Points of an arm's skin, and finding on it where something touches."""
+"""Points of an arm's surface, and finding on it where something touches."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from tests.robot.worlds import OWN_SCENE
 
 from contactsafe.robot import robots
-from contactsafe.robot.contact import best_point, contact_lever, skin_torque
+from contactsafe.robot.contact import best_point, contact_lever, surface_torque
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
 
@@ -35,14 +35,14 @@ class Placed:
     def search(self, torque):
         """Give the link found for a contact torque, and the lever arm there, m."""
         scratch = np.zeros(self.arm.n)
-        best, _ = best_point(self.handle, 0, len(self.arm.skin), torque, scratch, -1, 0.0)
-        return skin_torque(self.handle, best, scratch), np.linalg.norm(scratch)
+        best, _ = best_point(self.handle, 0, len(self.arm.surface), torque, scratch, -1, 0.0)
+        return surface_torque(self.handle, best, scratch), np.linalg.norm(scratch)
 
 
 def random_contact(arm, rng):
     """Give a link from 4 on, a point of one of its capsules' sides, and the normal there, in the link's frame."""
     link = int(rng.integers(4, arm.n + 1))
-    capsules = arm.facts.links[link - 1].capsules
+    capsules = arm.description.links[link - 1].capsules
     capsule = capsules[rng.integers(len(capsules))]
     start, end = np.array(capsule.start), np.array(capsule.end)
     axis = (end - start) / np.linalg.norm(end - start)
@@ -52,14 +52,14 @@ def random_contact(arm, rng):
     return link, start + rng.random() * (end - start) + capsule.radius * normal, normal
 
 
-def test_skin_lies_on_the_capsules_with_unit_normals_outwards(arms):
+def test_surface_lies_on_the_capsules_with_unit_normals_outwards(arms):
     """A point less its normal times the capsule's radius lies on the axis, between the ends, square to it."""
     for arm in arms:
-        assert len(arm.skin) > 0
-        for link, *numbers in arm.skin:
+        assert len(arm.surface) > 0
+        for link, *numbers in arm.surface:
             point, normal = np.array(numbers[:3]), np.array(numbers[3:])
             assert_allclose(np.linalg.norm(normal), 1.0, rtol=0, atol=1e-12)
-            assert any(_on_side(capsule, point, normal) for capsule in arm.facts.links[int(link) - 1].capsules)
+            assert any(_on_side(capsule, point, normal) for capsule in arm.description.links[int(link) - 1].capsules)
 
 
 def _on_side(capsule, point, normal):
@@ -69,18 +69,18 @@ def _on_side(capsule, point, normal):
     return np.linalg.norm(foot - along * axis) < 1e-12 and -1e-12 < along < 1 + 1e-12 and abs(normal @ axis) < 1e-12
 
 
-def test_every_capsule_but_the_first_links_has_skin(arms):
+def test_every_capsule_but_the_first_links_has_surface(arms):
     for arm in arms:
-        sampled = {int(link) for link in arm.skin[:, 0]}
-        assert sampled == {k for k in range(2, arm.n + 1) if arm.facts.links[k - 1].capsules}
+        sampled = {int(link) for link in arm.surface[:, 0]}
+        assert sampled == {k for k in range(2, arm.n + 1) if arm.description.links[k - 1].capsules}
 
 
-def test_torque_of_a_push_on_the_skin_is_its_jacobian_transposed(states):
+def test_torque_of_a_push_on_the_surface_is_its_jacobian_transposed(states):
     for arm, q, _ in states[::4]:
         placed, tau = Placed(arm, q), np.zeros(arm.n)
-        for index in range(0, len(arm.skin), 7):
-            row = arm.skin[index]
-            link = skin_torque(placed.handle, index, tau)
+        for index in range(0, len(arm.surface), 7):
+            row = arm.surface[index]
+            link = surface_torque(placed.handle, index, tau)
             assert link == int(row[0])
             assert_allclose(tau, placed.torque(link, row[1:4], -row[4:]), rtol=0, atol=1e-9)
 
@@ -96,7 +96,7 @@ def test_search_in_parts_is_the_search_at_once(panda):
             best, fit = best_point(placed.handle, start, start + 60, torque, scratch, best, fit)
         assert (best, fit) == whole
         for index in range(480):
-            skin_torque(placed.handle, index, scratch)
+            surface_torque(placed.handle, index, scratch)
             size = np.linalg.norm(scratch) * np.linalg.norm(torque)
             assert size == 0.0 or scratch @ torque / size <= fit + 1e-12
 
@@ -138,7 +138,7 @@ def test_random_contacts_are_found_where_they_are(request, name):
     assert np.mean(lever) > 0.85
 
 
-def test_skin_of_geoms_finds_contacts_as_often_as_that_of_capsules(panda):
+def test_surface_of_geoms_finds_contacts_as_often_as_that_of_capsules(panda):
     """The Panda read from MJCF: 78 % on the very link, 97 % there or next to it, lever arm right in 94 %, measured."""
     read, rng = robots.from_mjcf(panda.model, site=panda.site), np.random.default_rng(0)
     right, near, lever = np.zeros((500, 2)), np.zeros((500, 2)), np.zeros((500, 2))

@@ -21,8 +21,8 @@ from contactsafe.core import compiled
 def copied_sources(tmp_path, monkeypatch):
     """Let the digest look at a copy of the package."""
     root = tmp_path / "contactsafe"
-    shutil.copytree(pathlib.Path(compiled.__file__).parent, root, ignore=lambda _, names: _not_python(names))
-    monkeypatch.setattr(compiled, "__file__", str(root / "compiled.py"))
+    shutil.copytree(pathlib.Path(compiled.__file__).parents[1], root, ignore=lambda _, names: _not_python(names))
+    monkeypatch.setattr(compiled, "__file__", str(root / "core/compiled.py"))
     return root
 
 
@@ -35,7 +35,7 @@ def test_digest_is_that_of_the_contents(copied_sources):
     assert len(compiled._digest()) == 16
 
 
-@pytest.mark.parametrize("file", ["robot/linalg.py", "control/laws.py", "compiled.py", "sim/stepping.py"])
+@pytest.mark.parametrize("file", ["core/linalg.py", "control/laws.py", "core/compiled.py", "sim/stepping.py"])
 def test_changing_any_source_changes_the_cache(copied_sources, file):
     """Numba by itself would go on using what it inlined from another file."""
     before = compiled._digest()

@@ -1,4 +1,4 @@
-"""The skin of a user's own arm: points on the surface of its geoms."""
+"""The surface of a user's own arm: points on the surface of its geoms."""
 
 import mujoco
 import numpy as np
@@ -49,12 +49,12 @@ def showing(geoms):
 
 
 def seen_from_geom(model, arm, geom):
-    """Give points and normals of the second link's skin in a geom's frame, (P, 3) each."""
-    assert_array_equal(arm.skin[:, 0], 2)
+    """Give points and normals of the second link's surface in a geom's frame, (P, 3) each."""
+    assert_array_equal(arm.surface[:, 0], 2)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     R, origin = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
-    return (arm.skin[:, 1:4] + data.xanchor[1] - origin) @ R, arm.skin[:, 4:] @ R
+    return (arm.surface[:, 1:4] + data.xanchor[1] - origin) @ R, arm.surface[:, 4:] @ R
 
 
 def above(shape, p, size):
@@ -141,22 +141,22 @@ def test_what_the_last_link_carries_is_tool_and_no_skin():
     tool = '<body name="tool"><geom size="0.02" pos="0 0 0.3"/></body>'
     _, alone = showing('<geom size="0.05"/>')
     _, carrying = showing('<geom size="0.05"/>' + tool)
-    assert_array_equal(carrying.skin, alone.skin)
+    assert_array_equal(carrying.surface, alone.surface)
     model, bare = showing(tool)
     assert_allclose(np.linalg.norm(seen_from_geom(model, bare, 2)[0], axis=1), 0.02, rtol=1e-9)
     part = robots.from_mjcf(mujoco.MjModel.from_xml_string(SIX), site="tip", joints=["lift", "elbow", "wrist2"])
-    assert set(part.skin[:, 0]) == {2, 3}
-    assert np.ptp(part.skin[part.skin[:, 0] == 2, 1:4], axis=0).max() > 0.45  # forearm and first wrist
+    assert set(part.surface[:, 0]) == {2, 3}
+    assert np.ptp(part.surface[part.surface[:, 0] == 2, 1:4], axis=0).max() > 0.45  # forearm and first wrist
 
 
 def test_arm_without_geoms_has_no_skin():
-    assert showing("")[1].skin.shape == (0, 7)
+    assert showing("")[1].surface.shape == (0, 7)
 
 
 @pytest.mark.parametrize("site", ["tip", "left/tcp"])
 def test_every_link_beyond_the_first_has_its_share_of_480_points(site):
     arm = robots.from_mjcf(cell(), site=site)
-    links, counts = np.unique(arm.skin[:, 0], return_counts=True)
+    links, counts = np.unique(arm.surface[:, 0], return_counts=True)
     assert_array_equal(links, np.arange(2, arm.n + 1))
     assert_array_equal(counts, 480 // (arm.n - 1))
 
@@ -164,7 +164,7 @@ def test_every_link_beyond_the_first_has_its_share_of_480_points(site):
 def test_same_scene_has_the_same_skin_and_is_left_as_it_was():
     model = cell()
     before = model.geom_group.copy(), model.geom_rgba.copy(), model.geom_matid.copy()
-    first = robots.from_mjcf(model, site="left/tcp").skin
-    assert_array_equal(first, robots.from_mjcf(model, site="left/tcp").skin)
+    first = robots.from_mjcf(model, site="left/tcp").surface
+    assert_array_equal(first, robots.from_mjcf(model, site="left/tcp").surface)
     for now, then in zip((model.geom_group, model.geom_rgba, model.geom_matid), before, strict=True):
         assert_array_equal(now, then)

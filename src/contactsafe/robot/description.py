@@ -120,7 +120,7 @@ class Tool:
 
 
 @dataclass(frozen=True)
-class ArmFacts:
+class ArmDescription:
     """A serial arm.
 
     Attributes:

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.robot.facts import Inertia
+from contactsafe.robot.description import Inertia
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPING_PAD
 from contactsafe.robot.panda import PANDA
 
-ARMS = pytest.mark.parametrize("facts", [PANDA, FR3], ids=lambda facts: facts.name)
+ARMS = pytest.mark.parametrize("description", [PANDA, FR3], ids=lambda description: description.name)
 BODIES = {"hand": HAND.inertia, "pad": WIPING_PAD.inertia}
 for arm in (PANDA, FR3):
     BODIES |= {f"{arm.name} base": arm.base}
@@ -27,12 +27,12 @@ def test_such_a_body_can_exist(name):
 
 
 @ARMS
-def test_limits_are_in_order_and_home_is_well_inside(facts):
-    q_min, q_max, home = facts.joint_array("q_min"), facts.joint_array("q_max"), np.array(facts.home)
+def test_limits_are_in_order_and_home_is_well_inside(description):
+    q_min, q_max, home = description.joint_array("q_min"), description.joint_array("q_max"), np.array(description.home)
     assert np.all(q_min + 0.5 < home)
     assert np.all(home < q_max - 0.5)
     for field in ("qd_max", "tau_max", "armature"):
-        assert np.all(facts.joint_array(field) > 0)
+        assert np.all(description.joint_array(field) > 0)
 
 
 @pytest.mark.parametrize("link", PANDA.links)
@@ -41,9 +41,9 @@ def test_frames_are_turned_by_unit_quaternions(link):
 
 
 @ARMS
-def test_mass_is_that_of_an_arm_of_this_size(facts):
+def test_mass_is_that_of_an_arm_of_this_size(description):
     """The published weight is about 18 kg, base included."""
-    assert 16 < facts.base.mass + sum(link.inertia.mass for link in facts.links) < 19
+    assert 16 < description.base.mass + sum(link.inertia.mass for link in description.links) < 19
 
 
 def test_both_generations_stand_alike():
