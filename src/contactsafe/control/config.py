@@ -176,11 +176,11 @@ class ControllerConfig:
                 f"damping_range = {self.damping_range} reaches what a delay of {self.loop_delay_s} s at a tick of "
                 f"{self.dt} s makes unstable; keep it below {highest:.4g} 1/s, or make the loop faster"
             )
-        for unit in ("nm", "n"):
-            hold, yields = getattr(self, f"push_hold_{unit}"), getattr(self, f"push_yield_{unit}")
-            if hold < yields:
+        for what in ("torque_limit_{}_nm", "force_limit_{}_n"):
+            lower, higher = (f"contact_{what.format(reaction)}" for reaction in ("comply", "reject"))
+            if getattr(self, higher) < getattr(self, lower):
                 raise InvalidInputError(
-                    f"push_hold_{unit} = {hold} is below push_yield_{unit} = {yields}; "
+                    f"{higher} = {getattr(self, higher)} is below {lower} = {getattr(self, lower)}; "
                     "the arm may push harder to hold than to yield, never less"
                 )
 
