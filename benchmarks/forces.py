@@ -9,11 +9,11 @@ import sys
 
 import numpy as np
 
-from contactsafe.envs import make_engine
-from contactsafe.envs.config import WipingConfig
-from contactsafe.learning.bundle import shipped_bundle
-from contactsafe.learning.evaluation import CONTACT_N
-from contactsafe.learning.policy import Policy
+from contactsafe.policy.bundle import shipped_bundle
+from contactsafe.policy.policy import Policy
+from contactsafe.tasks import make_engine
+from contactsafe.tasks.base.evaluation import CONTACT_N
+from contactsafe.tasks.wiping.config import WipingConfig
 
 STEPS = 600  # ten seconds
 AIR_STEPS, LANDING_STEPS = 5, 3

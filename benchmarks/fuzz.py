@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from contactsafe.core.errors import ContactSafeError
-from contactsafe.envs.tasks import OBSERVED
-from contactsafe.learning import graph
-from contactsafe.learning.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
-from contactsafe.learning.operators import RULES
-from contactsafe.learning.policy import Policy
+from contactsafe.policy import graph
+from contactsafe.policy.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
+from contactsafe.policy.observation import OBSERVED
+from contactsafe.policy.operators import RULES
+from contactsafe.policy.policy import Policy
 
 BATCH = 50
 SECONDS = 20.0
@@ -276,14 +276,14 @@ def checkpoints(seed: int, items: range):
     import gymnasium
     import torch
 
-    from contactsafe.envs.config import WipingConfig
-    from contactsafe.envs.pushes import Pushes
     from contactsafe.learning.algorithms import PpoConfig, SacConfig
     from contactsafe.learning.checkpoints import CHECKPOINT, load_checkpoint, pack, save_checkpoint, unpack
     from contactsafe.learning.run import Run, load_run
     from contactsafe.learning.train_policy import _encoded, _Eyes
     from contactsafe.learning.train_vae import VaeConfig, train_vae
     from contactsafe.sim.randomisation import Randomisation
+    from contactsafe.tasks.base.pushes import Pushes
+    from contactsafe.tasks.wiping.config import WipingConfig
 
     def make_env():
         task = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes(), episode_s=1.0)

@@ -18,16 +18,16 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from contactsafe.core.compiled import compiled
-from contactsafe.envs.config import WipingConfig
 from contactsafe.learning.algorithms import PpoConfig
-from contactsafe.learning.observation import ObservationScaling
-from contactsafe.learning.perception import Perception
-from contactsafe.learning.scan import Scan
 from contactsafe.learning.vec_env import EncodedVecEnv
+from contactsafe.policy.dither import Scan
+from contactsafe.policy.observation import ObservationScaling
+from contactsafe.policy.perception import Perception
 from contactsafe.sim.camera import camera_at, render_mask_into
 from contactsafe.sim.ink import nearest_ink, remove_erased
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
+from contactsafe.tasks.wiping.config import WipingConfig
 
 ROLLOUTS = 6
 

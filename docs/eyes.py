@@ -17,12 +17,12 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from contactsafe.envs.rectify import WINDOW_M, rectify
-from contactsafe.envs.sampling import MaskSampler
 from contactsafe.learning.encoder import EncoderConfig
-from contactsafe.learning.perception import Perception, open_session
 from contactsafe.learning.probe import nearest_ink
 from contactsafe.learning.train_vae import HELD_OUT_SEED, VaeConfig, train_vae
+from contactsafe.policy.perception import Perception, open_session
+from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.vision.rectify import WINDOW_M, rectify
 
 PICTURES, HELD_OUT, VAE_PICTURES, VAE_EPOCHS = 12_000, 2_000, 12_000, 10
 STEPS, BATCH = 3000, 256

@@ -3,8 +3,8 @@
 import gymnasium
 
 import contactsafe  # noqa: F401  (makes the environment known)
-from contactsafe.learning.bundle import shipped_bundle
-from contactsafe.learning.policy import Policy
+from contactsafe.policy.bundle import shipped_bundle
+from contactsafe.policy.policy import Policy
 
 
 def main(seconds: float = 20.0) -> float:

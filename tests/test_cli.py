@@ -15,14 +15,14 @@ import contactsafe
 from contactsafe.cli import COMMANDS, main
 from contactsafe.control import presets
 from contactsafe.core.parse import parse
-from contactsafe.envs import ENGINES
-from contactsafe.envs.config import Sight
 from contactsafe.experiments.config import PLANTS
 from contactsafe.experiments.registry import ENTRIES
-from contactsafe.learning.bundle import shipped_bundle
-from contactsafe.learning.evaluation import FIGURES
-from contactsafe.learning.references import REFERENCES
+from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.sim.drawings import BOARDS
+from contactsafe.tasks import ENGINES
+from contactsafe.tasks.base.evaluation import FIGURES
+from contactsafe.tasks.wiping.config import Sight
+from contactsafe.tasks.wiping.scripted import REFERENCES
 
 UNKNOWN = "--{}: 'best' is unknown; choose from vices, paper, safe; see contactsafe {} --help"
 

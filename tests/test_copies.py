@@ -22,24 +22,24 @@ import contactsafe as cs
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.copying import OfTraining, Threads, Unique
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.pushes import Pushes
-from contactsafe.envs.sampling import MaskSampler
-from contactsafe.envs.tasks import WipingTasks
-from contactsafe.envs.wiping import WipingEnv
 from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.run import Run
-from contactsafe.learning.bundle import Bundle, shipped_bundle
-from contactsafe.learning.perception import Perception
-from contactsafe.learning.policy import Policy
-from contactsafe.learning.references import Chance, NearestInk, Raster
+from contactsafe.policy.bundle import Bundle, shipped_bundle
+from contactsafe.policy.perception import Perception
+from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.whiteboard import Whiteboard
 from contactsafe.sim.world import Worlds
+from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.env import WipingEnv
+from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.tasks.wiping.scripted import Chance, NearestInk, Raster
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 VARIED = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes())
 RNG = np.random.default_rng(0)
@@ -228,8 +228,8 @@ def late_playback():
 
 
 def encoded():
-    from contactsafe.learning.observation import ObservationScaling
     from contactsafe.learning.vec_env import EncodedVecEnv
+    from contactsafe.policy.observation import ObservationScaling
 
     made = envs()
     eyes = Perception(None, "foveated", 0.64, 128, made.camera_homography, share=True)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 
 LOAD = """
 import time
-from contactsafe.learning.bundle import Bundle, shipped_bundle
+from contactsafe.policy.bundle import Bundle, shipped_bundle
 Bundle.load(shipped_bundle())
 time.sleep(1.0)
 """

@@ -18,7 +18,7 @@ WATCHED = """
 import gymnasium, numpy as np
 from numba.core import event
 import contactsafe as cs
-from contactsafe.envs.config import WipingConfig
+from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.randomisation import Randomisation
 

@@ -8,10 +8,10 @@ from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
 from contactsafe.core.errors import ContactSafeError
-from contactsafe.envs import register as _register
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.payload import Payload
+from contactsafe.tasks import register as _register
 
 _register()
 

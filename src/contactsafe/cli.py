@@ -19,14 +19,14 @@ from contactsafe.core import process
 from contactsafe.core.compiled import CACHE_FOLDER
 from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.core.parse import call, docstring, one_of, parse, some_of
-from contactsafe.envs import ENGINES
-from contactsafe.envs.config import Sight, WipingConfig
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
-from contactsafe.learning.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
-from contactsafe.learning.references import REFERENCES
+from contactsafe.policy.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
 from contactsafe.sim.drawings import Boards
+from contactsafe.tasks import ENGINES
+from contactsafe.tasks.wiping.config import Sight, WipingConfig
+from contactsafe.tasks.wiping.scripted import REFERENCES
 
 _COMPILES = "the first run compiles for a minute or two"
 
@@ -155,12 +155,12 @@ def evaluate(
         reference: a script in place of the policy.
         json: print JSON instead of a table.
     """
-    from contactsafe.envs import make_engine
-    from contactsafe.envs.pushes import Pushes
-    from contactsafe.learning import references
-    from contactsafe.learning.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
-    from contactsafe.learning.policy import Policy
+    from contactsafe.policy.policy import Policy
     from contactsafe.sim.randomisation import Randomisation
+    from contactsafe.tasks import make_engine
+    from contactsafe.tasks.base.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
+    from contactsafe.tasks.base.pushes import Pushes
+    from contactsafe.tasks.wiping import scripted as references
 
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
@@ -281,8 +281,8 @@ def _settings(kind: type, program: str, words: list[str]) -> Any:
 
 
 def _train_vae(arguments: list[str]) -> None:
-    from contactsafe.envs.sampling import MaskSampler
     from contactsafe.learning.train_vae import VaeConfig, train_vae
+    from contactsafe.tasks.wiping.sampling import MaskSampler
 
     config = _settings(VaeConfig, "contactsafe train vae", arguments)
     sampler = MaskSampler()

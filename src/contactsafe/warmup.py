@@ -10,18 +10,18 @@ import numpy as np
 
 from contactsafe.control.controller import Controller
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.envs import ENGINES
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.rectify import rectify
-from contactsafe.envs.sampling import MaskSampler
-from contactsafe.learning.bundle import shipped_bundle
-from contactsafe.learning.policy import Policy
+from contactsafe.policy.bundle import shipped_bundle
+from contactsafe.policy.policy import Policy
 from contactsafe.robot.arm import Arm, arm_from_description
 from contactsafe.robot.franka import HAND
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import panda
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.world import Worlds
+from contactsafe.tasks import ENGINES
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.vision.rectify import rectify
 
 MOST_JOINTS = 14
 

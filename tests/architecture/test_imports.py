@@ -23,7 +23,7 @@ def test_import_contactsafe_is_light():
     assert loaded_by("import contactsafe", HEAVY) == []
 
 
-@pytest.mark.parametrize("module", ["contactsafe.cli", "contactsafe.learning.bundle", "contactsafe.learning.policy"])
+@pytest.mark.parametrize("module", ["contactsafe.cli", "contactsafe.policy.bundle", "contactsafe.policy.policy"])
 def test_running_a_policy_does_not_import_training(module):
     assert loaded_by(f"import {module}", TRAINING_ONLY) == []
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from contactsafe.learning.evaluation import FIGURES
+from contactsafe.tasks.base.evaluation import FIGURES
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "howto" / "evaluating.md").read_text(encoding="utf-8")

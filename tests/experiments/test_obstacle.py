@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.envs.action import DOWN
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.joint_safety import _HIT_AT, contact_metrics, forearm, held_before_forearm
 from contactsafe.experiments.run import run_policy
+from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.shape import arm_capsules
 from contactsafe.sim.config import WorldConfig, bottle, thrust_meter
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 SEEDS = range(4)
 

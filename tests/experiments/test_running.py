@@ -2,11 +2,11 @@
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.envs.tasks_by_script import wipe_nearest
+from tests.tasks.wiping.tasks_by_script import wipe_nearest
 
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.run import holding, run_policy
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 SPOT = np.zeros((30, 30))
 SPOT[13:16, 13:16] = 1

@@ -4,7 +4,7 @@ import numpy as np
 
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.task_safety import task_safety
-from contactsafe.learning.bundle import Bundle, shipped_bundle
+from contactsafe.policy.bundle import Bundle, shipped_bundle
 
 
 def test_the_film_is_not_of_a_board_that_one_stroke_wipes_but_of_the_fullest():

@@ -16,13 +16,13 @@ from stable_baselines3.common.noise import NormalActionNoise  # noqa: E402
 from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
 from contactsafe.core.errors import InvalidInputError  # noqa: E402
-from contactsafe.envs.tasks import OBSERVED  # noqa: E402
 from contactsafe.learning.algorithms import ALGORITHMS, PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.bundle import Bundle  # noqa: E402
-from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.policy_config import PolicyConfig  # noqa: E402
 from contactsafe.learning.replay import ReplayFile  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
+from contactsafe.policy.bundle import Bundle  # noqa: E402
+from contactsafe.policy.observation import ObservationScaling  # noqa: E402
+from contactsafe.tasks.wiping.tasks import OBSERVED  # noqa: E402
 
 SMALL = {
     "num_envs": 4,

@@ -15,13 +15,13 @@ from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
 
 from contactsafe.core.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
-from contactsafe.learning.bundle import Bundle  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
-from contactsafe.learning.observation import ObservationScaling  # noqa: E402
 from contactsafe.learning.recorder import Recorder  # noqa: E402
-from contactsafe.learning.scan import Scan  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.vec_env import EncodedVecEnv  # noqa: E402
+from contactsafe.policy.bundle import Bundle  # noqa: E402
+from contactsafe.policy.dither import Scan  # noqa: E402
+from contactsafe.policy.observation import ObservationScaling  # noqa: E402
 
 SCALING = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
 

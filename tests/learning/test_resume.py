@@ -24,13 +24,13 @@ import contactsafe  # noqa: E402, F401 -- registers the task
 from contactsafe.cli import main  # noqa: E402
 from contactsafe.core.copying import Threads  # noqa: E402
 from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
-from contactsafe.envs.config import WipingConfig  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, save_checkpoint, unpack  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
+from contactsafe.tasks.wiping.config import WipingConfig  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "evaluate_episodes": 0, "total_steps": 512}
 PPO = PpoConfig(epochs=2, **SMALL)

@@ -15,9 +15,9 @@ from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
 from contactsafe.learning.datasets import make_dataset  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder, vae_loss  # noqa: E402
-from contactsafe.learning.perception import Perception, open_session  # noqa: E402
 from contactsafe.learning.probe import nearest_ink  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
+from contactsafe.policy.perception import Perception, open_session  # noqa: E402
 
 H = camera_homography()
 TINY = EncoderConfig(size=32, channels=(4, 4, 8))

@@ -12,13 +12,13 @@ import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
-from contactsafe.envs.action import DOWN
-from contactsafe.learning.evaluation import HELD_OUT_SEED
+from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.shape import arm_capsules, link_frames
 from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
 
 LEAD_M = 0.05
 """How far a policy's x_d may lead the tool."""

@@ -4,14 +4,15 @@ import math
 
 import numpy as np
 
-from contactsafe.envs.config import ActionConfig, WipingConfig
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.collision_scenes import sample_plant, scene_rng
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
+from contactsafe.policy.action_config import ActionConfig
 from contactsafe.robot import robots
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 QUESTION = (
     "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes (K1 = 75 1/s², a soft tool; "

@@ -5,15 +5,15 @@ from collections.abc import Callable
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.envs.action import DOWN
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
+from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.shape import arm_capsules
 from contactsafe.sim.config import Obstacle, WorldConfig, bottle, thrust_meter
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 QUESTION = (
     "An object the policy has never seen draws it to the right, where something is held in the forearm's way: "

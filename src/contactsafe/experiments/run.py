@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 
 from contactsafe.core.errors import BundleError
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.results import Recording
-from contactsafe.learning.bundle import Bundle
-from contactsafe.learning.evaluation import HELD_OUT_SEED
-from contactsafe.learning.policy import Policy
+from contactsafe.policy.bundle import Bundle
+from contactsafe.policy.policy import Policy
 from contactsafe.sim.records import trace_dtype
 from contactsafe.sim.world import MAX_TICKS, POLICY_RATE_HZ
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 Act = Callable[[dict[str, np.ndarray]], np.ndarray]
 """From a batch of observations to actions, (n, 18)."""

@@ -9,12 +9,13 @@ import numpy as np
 from contactsafe.control.tick import control_tick, tick_at
 from contactsafe.core.compiled import compiled
 from contactsafe.core.native import mj_step
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import ACTION_SIZE, WipingTasks
-from contactsafe.learning.policy import Policy
+from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.policy.policy import Policy
 from contactsafe.sim.camera import render_mask_into
 from contactsafe.sim.records import noise_channels
 from contactsafe.sim.stepping import run_ticks
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 ROUNDS = 15
 """Times each part is timed."""

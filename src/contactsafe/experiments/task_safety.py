@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from contactsafe.envs.config import WipingConfig
-from contactsafe.envs.tasks import WipingTasks
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 QUESTION = (
     "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"

@@ -6,8 +6,8 @@ import numpy as np
 from tqdm import tqdm
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.envs.rectify import rectify
-from contactsafe.learning.perception import LEARNED
+from contactsafe.policy.perception import LEARNED
+from contactsafe.vision.rectify import rectify
 
 CHUNK = 512
 

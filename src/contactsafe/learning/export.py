@@ -16,11 +16,11 @@ from torch import nn
 
 from contactsafe.core.errors import BundleError, ContactSafeError, OutputError
 from contactsafe.core.files import cannot_write, write_whole
-from contactsafe.envs.tasks import OBSERVED
-from contactsafe.learning.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
 from contactsafe.learning.checkpoints import write_json
 from contactsafe.learning.encoder import MaskEncoder
-from contactsafe.learning.perception import open_session
+from contactsafe.policy.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
+from contactsafe.policy.observation import OBSERVED
+from contactsafe.policy.perception import open_session
 
 TOLERANCE = 1e-4
 """Largest difference between torch and ONNX Runtime that is let pass.

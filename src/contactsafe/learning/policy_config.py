@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of, some_of
-from contactsafe.envs import ENGINES
-from contactsafe.learning.observation import SCALES
+from contactsafe.policy.observation import SCALES
+from contactsafe.tasks import ENGINES
 
 SESSION_FIELDS = (
     "vae",

@@ -9,7 +9,12 @@ from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
 from contactsafe.core.errors import BundleError, InvalidInputError, shown
-from contactsafe.learning.bundle import (
+from contactsafe.learning.checkpoints import CHECKPOINT, plain, run_folder, write_json
+from contactsafe.learning.export import export_bundle
+from contactsafe.learning.recorder import Curves, Recorder
+from contactsafe.learning.run import Run, load_run
+from contactsafe.learning.vec_env import EncodedVecEnv
+from contactsafe.policy.bundle import (
     ENCODER,
     FOLDER,
     MAX_LATENT,
@@ -18,12 +23,10 @@ from contactsafe.learning.bundle import (
     digest,
     read_bounded,
 )
-from contactsafe.learning.checkpoints import CHECKPOINT, plain, run_folder, write_json
-from contactsafe.learning.evaluation import HELD_OUT_SEED, evaluate_policy
-from contactsafe.learning.export import export_bundle
-from contactsafe.learning.graph import check_ports, read_graph
-from contactsafe.learning.observation import ObservationScaling
-from contactsafe.learning.perception import (
+from contactsafe.policy.dither import Scan
+from contactsafe.policy.graph import check_ports, read_graph
+from contactsafe.policy.observation import ObservationScaling
+from contactsafe.policy.perception import (
     EYES_FORMAT,
     LEARNED,
     REPRESENTATIONS,
@@ -31,11 +34,8 @@ from contactsafe.learning.perception import (
     encoder_ports,
     open_session,
 )
-from contactsafe.learning.policy import Policy
-from contactsafe.learning.recorder import Curves, Recorder
-from contactsafe.learning.run import Run, load_run
-from contactsafe.learning.scan import Scan
-from contactsafe.learning.vec_env import EncodedVecEnv
+from contactsafe.policy.policy import Policy
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
 
 
 def train_policy(config, make_env=None, make_held_out=None):

@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from contactsafe.envs.rectify import WINDOW_M
 from contactsafe.learning.checking import check_like, check_optimiser, part, whole
 from contactsafe.learning.checkpoints import (
     check_same_config,
@@ -24,9 +23,10 @@ from contactsafe.learning.checkpoints import (
 from contactsafe.learning.datasets import make_dataset
 from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
-from contactsafe.learning.perception import EYES_FORMAT, Perception
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
 from contactsafe.learning.recorder import EventFile
+from contactsafe.policy.perception import EYES_FORMAT, Perception
+from contactsafe.vision.rectify import WINDOW_M
 
 _MAY_DIFFER = ("out", "resume", "threads", "held_out", "probe_steps")
 """Settings that may change when a run goes on."""

@@ -9,9 +9,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError, shown
-from contactsafe.learning.evaluation import step_values
-from contactsafe.learning.scan import Scan
+from contactsafe.policy.dither import Scan
 from contactsafe.sim.snapshot import Part, check, of_array, of_object, put, take
+from contactsafe.tasks.base.evaluation import step_values
 
 _STILL = Scan(amplitude=0.0)
 

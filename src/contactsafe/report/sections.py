@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 import contactsafe
-from contactsafe.learning.evaluation import CONTACT_N
 from contactsafe.report import data, rows, strip, tables
 from contactsafe.report.data import Experiment, Recording, RunInfo
 from contactsafe.report.film import film_json
@@ -16,6 +15,7 @@ from contactsafe.report.scene import Subject
 from contactsafe.report.summary import versions
 from contactsafe.robot.panda import PANDA, WIPING_PAD
 from contactsafe.sim.config import BoardConfig
+from contactsafe.tasks.base.evaluation import CONTACT_N
 
 SUBJECT = Subject(PANDA, WIPING_PAD, BoardConfig())
 """What the experiments simulate."""

@@ -14,7 +14,7 @@ from contactsafe.robot.mjcf import ARM_CONTYPE
 from contactsafe.sim.camera import camera_axes, plane_homography
 from contactsafe.sim.config import BoardConfig, Camera
 from contactsafe.sim.whiteboard import INK
-from contactsafe.vision import cv2
+from contactsafe.vision.opencv import cv2
 from contactsafe.vision.silhouette import Solids, cast, fill, on_plane, project, rims, silhouette
 
 PHOTO_PX = 455

@@ -1,9 +1,9 @@
 """Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together."""
 
-import cv2
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.vision.opencv import cv2
 from contactsafe.vision.silhouette import fill, on_plane
 
 INK_PIXEL, OTHER_PIXEL = 0, 255

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
+
+from contactsafe.vision.opencv import cv2
 
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _TURN = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)

@@ -1,0 +1,1 @@
+"""Between a policy and a controller: observations, actions, the bundle, and how it acts. No torch, no simulator."""

@@ -1,0 +1,79 @@
+"""From an action to the controller's target, compiled: increments of x_d, K1 and D1, then its posture."""
+
+import numpy as np
+
+from contactsafe.core.compiled import compiled
+from contactsafe.core.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
+from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture
+
+DOWN = np.array([0.0, 1.0, 0.0, 0.0])
+"""Orientation of a tool that points straight down, w x y z."""
+
+_UNDO_DOWN = np.array([0.0, -1.0, 0.0, 0.0])
+
+ACTION_NAMES = tuple(
+    [f"x_d {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    + [f"K1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    + [f"D1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+)
+
+
+@compiled
+def rotation_from_down(quat):
+    """Give the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
+    return quat_to_rotvec(quat_multiply(quat, _UNDO_DOWN))
+
+
+@compiled(nogil=True)
+def apply_action(c, limits, rule, action):
+    """Move the target of a `controller_dtype` record by one action.
+
+    x_d never leads the tool by more than `lead` along the board, nor leaves its bounds; the posture is the one that
+    goes with x_d, whatever way led there, and stays where it was when there is none.
+
+    Args:
+        c: the controller; its `output.position` is where the tool was measured last.
+        limits: `ActionLimits`.
+        rule: the arm's `PostureRule`.
+        action: (18,); clipped to [−1, 1].
+    """
+    target = c.target
+    rotvec = rotation_from_down(target.quat)
+    for i in range(6):
+        a = min(max(action[i], -1.0), 1.0) * limits.step[i]
+        if i < 3:
+            target.position[i] = min(max(target.position[i] + a, limits.low[i]), limits.high[i])
+        else:
+            rotvec[i - 3] = min(max(rotvec[i - 3] + a, limits.low[i]), limits.high[i])
+        K = target.K_task[i] + min(max(action[6 + i], -1.0), 1.0) * limits.step[6 + i]
+        D = target.D_task[i] + min(max(action[12 + i], -1.0), 1.0) * limits.step[12 + i]
+        target.K_task[i] = min(max(K, limits.K_low[i]), limits.K_high[i])
+        target.D_task[i] = min(max(D, limits.D_low[i]), limits.D_high[i])
+    for i in range(2):
+        tool = c.output.position[i]
+        target.position[i] = min(max(target.position[i], tool - limits.lead[0]), tool + limits.lead[0])
+    target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
+    q_posture = np.empty(target.q_posture.shape[0])
+    error, rotation_error = find_posture(rule, target.position, target.quat, q_posture)
+    if error <= POSITION_TOLERANCE and rotation_error <= ROTATION_TOLERANCE:
+        target.q_posture[:] = q_posture
+
+
+@compiled
+def observed_pose(c, out):
+    """Fill tool position, m, and rotation vector from straight down, rad, as measured, (6,)."""
+    rotvec = rotation_from_down(matrix_to_quat(c.output.rotation))
+    for i in range(3):
+        out[i] = c.output.position[i]
+        out[3 + i] = rotvec[i]
+
+
+@compiled
+def observed_target(c, pose, out):
+    """Fill x_d less the observed pose, m and rad, then K1, 1/s², and D1, 1/s, (18,)."""
+    rotvec = rotation_from_down(c.target.quat)
+    for i in range(3):
+        out[i] = c.target.position[i] - pose[i]
+        out[3 + i] = rotvec[i] - pose[3 + i]
+    out[6:12] = c.target.K_task
+    out[12:18] = c.target.D_task

@@ -1,0 +1,80 @@
+"""How far one action moves a target, and the bounds that it keeps."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+Six = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class ActionConfig:
+    """How an action in [−1, 1]¹⁸ moves the target, each policy step of 1/60 s.
+
+    Attributes:
+        translation: largest step of x_d along x, y, z, m (0.4 m/s along the board, 0.12 m/s towards it).
+        rotation: largest step of x_d about x, y, z, rad.
+        stiffness: largest step of K1, 1/s²; at K = 100 that is 600 1/s³, within the passive rate of Kronander &
+            Billard 2016 (775 1/s³).
+        damping: largest step of D1, 1/s.
+        lead: largest distance of x_d from the tool along the board, m.
+        press: deepest x_d below the board, m.
+        height: highest x_d above the board, m.
+        reach: half edge of the square around the board's centre that x_d stays in, m.
+        tilt: largest rotation of x_d from straight down, rad, each axis.
+        stiffness_low, stiffness_high: range of K1, 1/s².
+        damping_low, damping_high: range of D1, 1/s.
+        stiffness_start: K1 at the start of an episode, 1/s²; D1 starts critical.
+    """
+
+    translation: tuple[float, float, float] = (0.0067, 0.0067, 0.002)
+    rotation: tuple[float, float, float] = (0.01, 0.01, 0.02)
+    stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
+    damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
+    lead: float = 0.05
+    press: float = 0.012
+    height: float = 0.12
+    reach: float = 0.27
+    tilt: float = 0.06
+    stiffness_low: Six = (60.0, 60.0, 60.0, 250.0, 250.0, 250.0)
+    stiffness_high: Six = (250.0, 250.0, 250.0, 700.0, 700.0, 700.0)
+    damping_low: Six = (14.0, 14.0, 14.0, 30.0, 30.0, 30.0)
+    damping_high: Six = (40.0, 40.0, 40.0, 60.0, 60.0, 60.0)
+    stiffness_start: Six = (150.0, 150.0, 150.0, 450.0, 450.0, 450.0)
+
+
+class ActionLimits(NamedTuple):
+    """An `ActionConfig` as arrays for compiled code.
+
+    Attributes:
+        step: largest change of pose, K1, D1, (18,).
+        low, high: bounds of x_d along x, y, z, m, and of the rotation vector from straight down, rad, (6,).
+        K_low, K_high, D_low, D_high: (6,).
+        lead: (1,), m.
+    """
+
+    step: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    K_low: np.ndarray
+    K_high: np.ndarray
+    D_low: np.ndarray
+    D_high: np.ndarray
+    lead: np.ndarray
+
+
+def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> ActionLimits:
+    """Resolve an action configuration for a workspace around a point, world, m."""
+    x, y, z = centre
+    reach, tilt = config.reach, config.tilt
+    return ActionLimits(
+        step=np.array([*config.translation, *config.rotation, *config.stiffness, *config.damping]),
+        low=np.array([x - reach, y - reach, z - config.press, -tilt, -tilt, -tilt]),
+        high=np.array([x + reach, y + reach, z + config.height, tilt, tilt, tilt]),
+        K_low=np.array(config.stiffness_low),
+        K_high=np.array(config.stiffness_high),
+        D_low=np.array(config.damping_low),
+        D_high=np.array(config.damping_high),
+        lead=np.array([config.lead]),
+    )

@@ -1,0 +1,125 @@
+"""From an observation to the latent, the same in training, in evaluation and on the robot. No torch."""
+
+import numpy as np
+import onnxruntime
+
+from contactsafe.core.copying import Independent, Threads
+from contactsafe.core.errors import BundleError, InvalidInputError
+from contactsafe.policy.graph import Graph, read_graph
+from contactsafe.vision.log_polar import FEATURES, SHARES, foveate, ground_of
+from contactsafe.vision.rectify import rectify
+
+LEARNED = ("tool", "paper")
+"""Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
+
+EYES_FORMAT = 3
+"""Version of what vae.json holds and of what its numbers mean."""
+
+REPRESENTATIONS = ("foveated", *LEARNED)
+
+
+class _Session(onnxruntime.InferenceSession):
+    """A session that copies and pickles as the bytes it was started on; copies check and start them again."""
+
+    def __init__(self, model, name, options):
+        super().__init__(model, options, providers=["CPUExecutionProvider"])
+        self._opened = model, name, options.intra_op_num_threads
+
+    def __reduce__(self):
+        return open_session, self._opened
+
+    def __copy__(self):
+        return open_session(*self._opened)
+
+
+def open_session(model, name, threads=1):
+    """Start ONNX Runtime on a model held in memory, once it has been checked.
+
+    Args:
+        model: the file's bytes, or a Graph that was read from them.
+        name: what to call it in errors.
+        threads: for one operator; 1 keeps clear of the control loop's core.
+
+    Raises:
+        BundleError: the bytes are no ONNX model, or one with more than `policy.graph` allows.
+    """
+    graph = model if isinstance(model, Graph) else read_graph(model, name)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    # Threads that spin between calls would eat the core the controller runs on.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_session_config_entry("session.load_model_format", "ONNX")
+    try:
+        return _Session(graph.model, name, options)
+    except Exception as error:
+        reason = str(error).splitlines()[0][:160]
+        raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
+
+
+def encoder_ports(size, latent_size):
+    """Give inputs and outputs of an encoder of pictures of so many pixels along a side, as `graph.check_ports` does."""
+    return {"mask": ("uint8", [size, size])}, {"latent": ("float", [latent_size])}
+
+
+class Perception(Independent):
+    """Masks and tool positions in, latents out.
+
+    Args:
+        session: ONNX Runtime session of the encoder; None for "foveated", which has none.
+        representation: "foveated" says where ink is, seen from the tool (`vision.log_polar`); "tool" shows the encoder
+            the mask in the tool's frame, "paper" as the camera sees it.
+        window_m: side of the tool's window, m; read for "tool".
+        size: pixels along a side of what the encoder takes, or of the camera's mask.
+        homography: board plane to camera pixels, (3, 3); not read for "paper".
+        share: whether threads of its own share a batch of foveated pictures; not for a control loop. `close` ends them.
+
+    Attributes:
+        latent_size: how many numbers come out.
+    """
+
+    def __init__(self, session, representation, window_m, size, homography, share=False):
+        if representation not in REPRESENTATIONS:
+            allowed = ", ".join(REPRESENTATIONS)
+            raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
+        self.session = session
+        self.representation = representation
+        self.window_m = window_m
+        self.size = size
+        self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
+        self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
+        self._threads = Threads(SHARES) if share and self.ground is not None else None
+        self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
+
+    def __call__(self, masks, tool_positions):
+        """Encode a batch.
+
+        Args:
+            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, ink 0.
+            tool_positions: (N, 2) or wider, m, world; x and y are read.
+
+        Returns:
+            Latents, (N, latent_size) float32.
+
+        Raises:
+            InvalidInputError: a shape or type differs.
+        """
+        if self.ground is not None:
+            return foveate(masks, tool_positions, self.ground, self._threads)
+        if self.representation == "tool":
+            views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
+        else:
+            views = np.asarray(masks)
+            views = views[..., 0] if views.ndim == 4 else views
+            if views.dtype != np.uint8 or views.shape[1:] != (self.size, self.size):
+                raise InvalidInputError(
+                    f"masks are {views.dtype} of shape {views.shape}; "
+                    f"this encoder takes uint8 (N, {self.size}, {self.size})"
+                )
+        return self.session.run(["latent"], {"mask": views})[0]
+
+    def close(self):
+        """End the threads."""
+        if self._threads is not None:
+            self._threads.close()

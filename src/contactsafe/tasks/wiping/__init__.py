@@ -1,0 +1,1 @@
+"""Wiping the ink off a whiteboard."""

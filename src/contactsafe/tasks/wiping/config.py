@@ -1,0 +1,91 @@
+"""What the wiping task can be told: one frozen dataclass, every field with its unit."""
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.drawings import Boards, check_boards
+from contactsafe.sim.randomisation import Randomisation
+from contactsafe.tasks.base.pushes import Pushes
+
+Sight = Literal["mask", "photograph"]
+
+
+@dataclass(frozen=True)
+class RewardConfig:
+    """Weights of the reward's terms; each is reported in `info` as `reward_<name>`.
+
+    Attributes:
+        ink: for the whole of the ink, paid in shares as it is wiped off.
+        done: once, when all is gone.
+        approach: per metre by which the nearest ink comes nearer, on steps that wipe nothing.
+        contact: per step with the pad on the board under `force_limit_n`.
+        time: per step.
+        force: per step at twice `gentle_n`, rising from zero at `gentle_n`, at most four times the weight.
+        force_limit_n: the paper's 40 N.
+        gentle_n: N.
+        arm_table: once, when any part but the pad meets board or table; the episode ends.
+    """
+
+    ink: float = 10.0
+    done: float = 5.0
+    approach: float = 5.0
+    contact: float = 0.005
+    time: float = -0.01
+    force: float = -0.04
+    force_limit_n: float = 40.0
+    gentle_n: float = 7.0
+    arm_table: float = -5.0
+
+    def __post_init__(self):
+        """Refuse a reward under which staying in contact for ever pays."""
+        if self.contact + self.time >= 0:
+            raise InvalidInputError(
+                f"reward contact {self.contact} + time {self.time} ≥ 0 pays for never finishing; "
+                f"keep contact below {-self.time}"
+            )
+
+
+@dataclass(frozen=True)
+class WipingConfig:
+    """The wiping task.
+
+    Attributes:
+        episode_s: time limit, s.
+        controller: preset by name; the free-space law is 'vices'.
+        clean_fraction: share of the ink below which the board counts as clean.
+        start_reach: the tool starts within this of the board's centre along x and y, m.
+        start_height: range of the tool's height above the board at the start, m.
+        boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
+            first need `contactsafe[handwriting]`.
+        sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
+            that changes with every episode; the latter needs `contactsafe[camera]`.
+        pushes: on the arm while it works; None for none.
+        randomisation: what differs from episode to episode besides the drawing; None for nothing.
+        world: plant, sensors, board, camera, obstacles.
+        action: scaling and limits.
+        reward: weights.
+    """
+
+    episode_s: float = 20.0
+    controller: str = "safe"
+    clean_fraction: float = 0.002
+    start_reach: float = 0.10
+    start_height: tuple[float, float] = (0.03, 0.08)
+    boards: Boards = "strokes"
+    sight: Sight = "mask"
+    pushes: Pushes | None = None
+    randomisation: Randomisation | None = None
+    world: WorldConfig = field(default_factory=WorldConfig)
+    action: ActionConfig = field(default_factory=ActionConfig)
+    reward: RewardConfig = field(default_factory=RewardConfig)
+
+    def __post_init__(self):
+        """Refuse a time limit, a kind of board or of sight that cannot be."""
+        check_boards(self.boards)
+        if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
+            raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
+        if self.sight not in get_args(Sight):
+            raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")

@@ -1,0 +1,200 @@
+"""The camera's mask as a retina sees it: fine about the tool, coarse far off, and no speck too small to count.
+
+What a wiping policy must read off the picture is where ink is from here. A grid in the camera's frame, or a small
+code of one, loses the last speck; a grid in the logarithm of the distance keeps it, and says direction and distance
+outright. Nothing here is learned.
+"""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contactsafe.core.byte_scan import places_unlike
+from contactsafe.core.compiled import compiled
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.vision.rectify import INK_BELOW
+
+RINGS = 10
+SECTORS = 16
+RADIUS_M = (0.01, 0.45)
+"""Distances of the first and the last ring's middle; nearer counts as the first, farther as the last."""
+
+SCALES_M = (0.01, 0.03, 0.1)
+"""Ink this far from the nearest ink weighs 1/e in the patch about it."""
+
+AMOUNT_M2 = 2e-5
+"""Ink area that counts as one, about a camera pixel: amounts are given as log(1 + area / AMOUNT_M2)."""
+
+NEAR_M = 0.02
+"""Distance below which the direction to ink fades."""
+
+FEATURES = RINGS * SECTORS + 4 * len(SCALES_M) + 1
+"""Numbers in a foveated picture."""
+
+SHARES = 2
+"""Into which a batch is split for threads."""
+
+
+class Ground(NamedTuple):
+    """Where each camera pixel looks at on the board.
+
+    Attributes:
+        place: x, y of its middle, m, (pixels, 2).
+        area: that it covers, m²; 0 where it looks past the board's plane, (pixels,).
+    """
+
+    place: np.ndarray
+    area: np.ndarray
+
+
+def ground_of(homography, size):
+    """Find where the pixels of a camera look at.
+
+    Args:
+        homography: board plane (x, y, 1) in m to homogeneous pixels (u = column, v = row, w), (3, 3). Pixel centres lie
+            at integer + 0.5.
+        size: rows and columns of its mask.
+
+    Returns:
+        `Ground`.
+
+    Raises:
+        InvalidInputError: the homography is not finite (3, 3), or cannot be inverted.
+    """
+    H = np.asarray(homography, dtype=np.float64)
+    if H.shape != (3, 3) or not np.isfinite(H).all():
+        raise InvalidInputError(f"homography has shape {H.shape}; give a finite (3, 3) matrix")
+    norm = np.linalg.norm(H)
+    if norm == 0.0 or abs(np.linalg.det(H / norm)) < 1e-15:
+        raise InvalidInputError("homography is singular: the camera would see the board edge-on; check its calibration")
+    inverse = np.linalg.inv(H)
+    v, u = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5, indexing="ij")
+    x, y, w = np.einsum("ij,jkl->ikl", inverse, np.stack([u, v, np.ones_like(u)]))
+    side = np.sign(w[size[0] // 2, size[1] // 2])
+    ahead = side * w > 1e-9
+    w = np.where(ahead, w, 1.0)
+    # The area that a homography maps to one pixel: |det H⁻¹| / |w|³.
+    area = np.where(ahead, abs(np.linalg.det(inverse)) / np.abs(w) ** 3, 0.0)
+    place = np.stack([x / w, y / w], axis=-1)
+    return Ground(place.reshape(-1, 2), np.ascontiguousarray(area.reshape(-1)))
+
+
+def foveate(masks, tool_positions, ground, threads=None):
+    """Say where ink is as seen from each tool.
+
+    Features, in this order: log-amount of ink in each of RINGS × SECTORS cells about the tool, rings evenly spaced in
+    the logarithm of distance, sectors from world x towards y, each pixel shared between the cells about it; for each
+    of SCALES_M the middle of the patch about the nearest ink: direction (2), fading below NEAR_M, its distance / 0.1 m,
+    and the log-amount of ink that goes into it; log-amount of all ink in sight. All are 0 where no ink is in sight.
+
+    A patch is about one place, so that of two patches as far away on either side the finer scales say the one or the
+    other. Their mean would lie under the tool, and a policy that believed it would stay there.
+
+    Args:
+        masks: camera masks, (N, height, width) or (N, height, width, 1), uint8: 0 is ink, 255 all else.
+        tool_positions: tool points in world, (N, 2) or wider, m; only x and y are read.
+        ground: `Ground` of the camera.
+        threads: `Threads` that share the work; None to do it here.
+
+    Returns:
+        (N, FEATURES) float32.
+
+    Raises:
+        InvalidInputError: a shape or type differs from the above.
+    """
+    masks = np.asarray(masks)
+    if masks.dtype != np.uint8 or masks.ndim < 3 or masks[0].size != len(ground.area):
+        raise InvalidInputError(
+            f"masks are {masks.dtype} of shape {masks.shape}; give uint8 of {len(ground.area)} pixels each"
+        )
+    tool_xy = np.asarray(tool_positions, dtype=np.float64)
+    if tool_xy.ndim != 2 or len(tool_xy) != len(masks) or tool_xy.shape[1] < 2:
+        raise InvalidInputError(
+            f"tool_positions have shape {tool_xy.shape}; give one row of x, y for each of {len(masks)} masks"
+        )
+    features = np.zeros((len(masks), FEATURES), dtype=np.float32)
+    flat = np.ascontiguousarray(masks).reshape(len(masks), -1)
+    tool_xy = np.ascontiguousarray(tool_xy[:, :2])
+    if threads is None:
+        _foveate_some(0, len(masks), flat, tool_xy, ground.place, ground.area, features)
+        return features
+    bounds = np.linspace(0, len(masks), min(len(masks), SHARES) + 1).astype(int).tolist()
+    shares = [
+        threads.submit(_foveate_some, start, stop, flat, tool_xy, ground.place, ground.area, features)
+        for start, stop in itertools.pairwise(bounds)
+    ]
+    for share in shares:
+        share.result()
+    return features
+
+
+@compiled(nogil=True)
+def _foveate_some(start, stop, masks, tool_xy, place, area, features):
+    for n in range(start, stop):
+        if math.isfinite(tool_xy[n, 0]) and math.isfinite(tool_xy[n, 1]):
+            _foveate_one(masks[n], tool_xy[n, 0], tool_xy[n, 1], place, area, features[n])
+
+
+@compiled(nogil=True)
+def _foveate_one(mask, tool_x, tool_y, place, area, out):
+    dark = np.empty(mask.shape[0], dtype=np.int32)
+    pixels = dark[: places_unlike(mask, np.uint8(255), dark)]
+    count, near = 0, 0
+    nearest = math.inf
+    for p in pixels:
+        if mask[p] < INK_BELOW and area[p] > 0.0:
+            pixels[count] = p
+            count += 1
+            distance = (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2
+            if distance < nearest:
+                near, nearest = p, distance
+    if count == 0:
+        return
+    grid, patches, total = np.zeros((RINGS, SECTORS)), np.zeros((len(SCALES_M), 3)), 0.0
+    for p in pixels[:count]:
+        dx, dy = place[p, 0] - tool_x, place[p, 1] - tool_y
+        distance = math.sqrt(dx * dx + dy * dy)
+        total += area[p]
+        _share_out(dx, dy, distance, area[p], grid)
+        away = math.sqrt((place[p, 0] - place[near, 0]) ** 2 + (place[p, 1] - place[near, 1]) ** 2)
+        for k in range(len(SCALES_M)):
+            weight = area[p] * math.exp(-away / SCALES_M[k])
+            patches[k, 0] += weight * dx
+            patches[k, 1] += weight * dy
+            patches[k, 2] += weight
+    _write(grid, patches, total, out)
+
+
+@compiled(nogil=True)
+def _share_out(dx, dy, distance, amount, grid):
+    """Share an amount between the two rings and the two sectors about its place."""
+    ring = math.log(max(distance, 1e-6) / RADIUS_M[0]) / math.log(RADIUS_M[1] / RADIUS_M[0]) * (RINGS - 1)
+    ring = min(max(ring, 0.0), RINGS - 1.0)
+    sector = (math.atan2(dy, dx) / (2.0 * math.pi) % 1.0) * SECTORS
+    r, s = int(ring), int(sector)
+    up, on = ring - r, sector - s
+    r_up = min(r + 1, RINGS - 1)
+    s, s_on = s % SECTORS, (s + 1) % SECTORS
+    grid[r, s] += amount * (1.0 - up) * (1.0 - on)
+    grid[r, s_on] += amount * (1.0 - up) * on
+    grid[r_up, s] += amount * up * (1.0 - on)
+    grid[r_up, s_on] += amount * up * on
+
+
+@compiled(nogil=True)
+def _write(grid, patches, total, out):
+    k = 0
+    for r in range(RINGS):
+        for s in range(SECTORS):
+            out[k] = math.log1p(grid[r, s] / AMOUNT_M2)
+            k += 1
+    for scale in range(patches.shape[0]):
+        x, y = patches[scale, 0] / patches[scale, 2], patches[scale, 1] / patches[scale, 2]
+        distance = math.sqrt(x * x + y * y)
+        out[k], out[k + 1] = x / (distance + NEAR_M), y / (distance + NEAR_M)
+        out[k + 2] = distance / 0.1
+        out[k + 3] = math.log1p(patches[scale, 2] / AMOUNT_M2)
+        k += 4
+    out[k] = math.log1p(total / AMOUNT_M2)

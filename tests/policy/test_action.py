@@ -1,0 +1,130 @@
+"""An action moves the target by what the configuration says, and never out of bounds; 17, 17, 16 ticks at a time."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
+from contactsafe.policy.action import ACTION_NAMES, DOWN, rotation_from_down
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.robot.arm import Pose
+from contactsafe.robot.ik import InverseKinematics
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
+
+CONFIG = ActionConfig()
+STEP = np.array([*CONFIG.translation, *CONFIG.rotation, *CONFIG.stiffness, *CONFIG.damping])
+
+
+@pytest.fixture
+def tasks():
+    made = WipingTasks(WipingConfig(controller="vices"), seed=0)
+    made.reset(0, np.random.default_rng(0), start=(0.5, 0.0, 0.06))
+    return made
+
+
+def target_of(tasks):
+    """x_d, its rotation from straight down, K1 and D1, (18,)."""
+    target = tasks.worlds.controllers[0]["target"]
+    return np.concatenate(
+        [target["position"], rotation_from_down(target["quat"].copy()), target["K_task"], target["D_task"]]
+    )
+
+
+def act(tasks, index, value, steps=1):
+    action = np.zeros((1, 18))
+    action[0, index] = value
+    for _ in range(steps):
+        tasks.step(action)
+
+
+def test_steps_last_17_17_16_ticks(tasks):
+    ticks = []
+    for _ in range(9):
+        tasks.step(np.zeros((1, 18)))
+        ticks.append(int(tasks.worlds.reports["ticks"][0]))
+    assert ticks == [17, 17, 16] * 3
+    assert tasks.worlds.plants[0]["tick"] == 150  # 9 steps of 1/60 s
+
+
+@pytest.mark.parametrize("index", range(18), ids=ACTION_NAMES)
+@pytest.mark.parametrize("value", [0.5, -1.0])
+def test_each_number_moves_its_own_part_of_the_target(tasks, index, value):
+    before = target_of(tasks)
+    act(tasks, index, value)
+    moved = np.zeros(ACTION_SIZE)
+    moved[index] = value * STEP[index]
+    assert_allclose(target_of(tasks) - before, moved, rtol=0, atol=1e-8)
+
+
+def test_actions_beyond_one_count_as_one(tasks):
+    before = target_of(tasks)
+    act(tasks, slice(None), 50.0)
+    assert_allclose(target_of(tasks) - before, STEP, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_stiffness_and_damping_keep_to_their_range(tasks, sign):
+    act(tasks, slice(6, 18), sign, steps=60)
+    target = tasks.worlds.controllers[0]["target"]
+    which = "high" if sign > 0 else "low"
+    assert_array_equal(target["K_task"], getattr(CONFIG, f"stiffness_{which}"))
+    assert_array_equal(target["D_task"], getattr(CONFIG, f"damping_{which}"))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_x_d_leads_the_tool_by_a_hand_at_most(tasks, sign):
+    for _ in range(25):
+        before = tasks.worlds.controllers[0]["output"]["position"].copy()
+        act(tasks, slice(0, 2), sign)
+        lead = target_of(tasks)[:2] - before[:2]
+        assert np.abs(lead).max() <= CONFIG.lead + 1e-12
+    assert_allclose(np.abs(lead).max(), CONFIG.lead, atol=0.02)
+
+
+def test_x_d_keeps_to_its_box(tasks):
+    board = np.array(tasks.config.world.board.centre)
+    act(tasks, 2, 1.0, steps=60)
+    assert_allclose(target_of(tasks)[2], board[2] + CONFIG.height)
+    act(tasks, 1, 1.0, steps=100)
+    assert target_of(tasks)[1] <= board[1] + CONFIG.reach + 1e-12
+    act(tasks, 2, -1.0, steps=80)
+    assert_allclose(target_of(tasks)[2], board[2] - CONFIG.press)
+
+
+def test_tilt_keeps_to_its_range(tasks):
+    act(tasks, slice(3, 6), 1.0, steps=20)
+    assert_allclose(target_of(tasks)[3:6], CONFIG.tilt, atol=1e-9)
+
+
+def test_the_posture_follows_x_d(tasks):
+    act(tasks, 1, 1.0, steps=6)
+    target = tasks.worlds.controllers[0]["target"]
+    pose = tasks.arm.tool_pose(target["q_posture"])
+    assert_allclose(pose.position, target["position"], atol=1e-3)
+    assert abs(pose.quat @ target["quat"]) > 1 - 1e-4
+
+
+def test_the_posture_does_not_depend_on_the_way_of_x_d(tasks):
+    """Round the board and back: warm-started inverse kinematics came back with the elbow elsewhere."""
+    for _ in range(3):
+        for index, value in ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0)):
+            act(tasks, index, value, steps=8)
+        target = tasks.worlds.controllers[0]["target"]
+        pose = Pose(target["position"].copy(), target["quat"].copy())
+        assert_allclose(target["q_posture"], InverseKinematics(tasks.arm).posture(pose), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rotvec", [(0.0, 0.0, 0.0), (0.1, -0.05, 0.02), (0.0, 0.0, 0.8)])
+def test_rotation_from_down_undoes_what_turned_it(rotvec):
+    quat = quat_multiply(rotvec_to_quat(np.array(rotvec)), DOWN)
+    assert_allclose(rotation_from_down(quat), rotvec, atol=1e-12)
+    assert_allclose(rotation_from_down(-quat), rotvec, atol=1e-12)
+
+
+def test_the_tool_goes_where_x_d_goes(tasks):
+    act(tasks, 1, 1.0, steps=12)
+    act(tasks, 1, 0.0, steps=80)
+    assert_allclose(tasks.tasks["pose"][0, :3], target_of(tasks)[:3], atol=0.01)
+    assert tasks.tasks["pose"][0, 1] > 0.03

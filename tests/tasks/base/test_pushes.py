@@ -1,0 +1,54 @@
+"""Somebody leans on the arm while it works: in turn, within the ranges, the same for the same seed."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
+
+PUSHES = Pushes(force_n=(20.0, 25.0), lasting_s=(0.2, 0.4), pause_s=(0.1, 0.2), links=(4, 5))
+
+
+def pushed(steps=120, seed=3):
+    """Hold still for a while; give what was planned at each step, and how far the tool went, m."""
+    tasks = WipingTasks(WipingConfig(controller="vices", pushes=PUSHES), 1, seed=0)
+    tasks.reset(0, np.random.default_rng(seed), drawing=np.ones((2, 2)), start=(0.5, 0.0, 0.1))
+    start, planned, way = tasks.tasks["pose"][0, :3].copy(), [], 0.0
+    for _ in range(steps):
+        plant = tasks.worlds.plants[0]
+        plan = [int(plant[name]) for name in ("push_body", "push_start", "push_stop")]
+        planned.append((*plan, *plant["push_force"]))
+        tasks.step(np.zeros((1, 18)))
+        way = max(way, float(np.linalg.norm(tasks.tasks["pose"][0, :3] - start)))
+    return sorted(set(planned), key=lambda push: push[1]), way
+
+
+def test_pushes_follow_one_another_within_their_ranges_and_move_the_arm():
+    plans, way = pushed()
+    assert len(plans) >= 3
+    for (_, _, stop, *_), (_, start, *_) in itertools.pairwise(plans):
+        assert start > stop
+    for _, start, stop, *force in plans:
+        assert 195 <= stop - start <= 405
+        assert 20.0 <= np.linalg.norm(force) <= 25.0
+    assert len({body for body, *_ in plans}) <= 2
+    assert way > 0.003
+
+
+def test_same_seed_same_pushes():
+    assert_array_equal(pushed(60)[0], pushed(60)[0])
+    assert pushed(60)[0] != pushed(60, seed=4)[0]
+
+
+def test_pushes_that_cannot_be_are_refused():
+    with pytest.raises(InvalidInputError) as error:
+        Pushes(force_n=(30.0, 5.0))
+    assert str(error.value) == "pushes force_n = (30.0, 5.0); give (low, high) with 0 ≤ low ≤ high"
+    with pytest.raises(InvalidInputError) as error:
+        Pushes(links=(8,))
+    assert str(error.value) == "pushes links = (8,); give some of 1 to 7"
