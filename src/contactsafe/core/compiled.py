@@ -29,7 +29,7 @@ from numba.core import caching, event
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
-_ROOMS = ("core", "robot", "vision", "control", "sim", "policy", "tasks", "envs")
+_ROOMS = ("core", "robot", "vision", "control", "sim", "policy", "tasks")
 """Where compiled functions call each other across files."""
 
 _PREFIX = "contactsafe-compiled-"

@@ -75,7 +75,7 @@ FIELDS = {
 
 def shipped_bundle():
     """Give the folder of the wiping policy that comes with the package."""
-    return Path(str(resources.files("contactsafe.learning") / "bundles" / "wiping"))
+    return Path(str(resources.files("contactsafe.policy") / "bundles" / "wiping"))
 
 
 def digest(data):

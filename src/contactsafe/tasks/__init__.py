@@ -19,8 +19,8 @@ def register() -> None:
         if name not in gymnasium.registry:
             gymnasium.register(
                 name,
-                entry_point=f"contactsafe.envs.{place}Env",
-                vector_entry_point=f"contactsafe.envs.{place}VectorEnv",
+                entry_point=f"contactsafe.tasks.wiping.{place}Env",
+                vector_entry_point=f"contactsafe.tasks.wiping.{place}VectorEnv",
             )
 
 
