@@ -6,9 +6,10 @@ from typing import Literal, get_args
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.drawings import Boards, check_boards
-from contactsafe.sim.randomisation import Randomisation
 from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.wiping.board import BoardConfig, Camera
+from contactsafe.tasks.wiping.drawings import Boards, check_boards
+from contactsafe.tasks.wiping.randomisation import Randomisation
 
 Sight = Literal["mask", "photograph"]
 
@@ -64,7 +65,9 @@ class WipingConfig:
             that changes with every episode; the latter needs `contactsafe[camera]`.
         pushes: on the arm while it works; None for none.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
-        world: plant, sensors, board, camera, obstacles.
+        world: plant, sensors, obstacles; its fixtures and the pad's surface are the board's.
+        board: the whiteboard.
+        camera: what looks at it.
         action: scaling and limits.
         reward: weights.
     """
@@ -79,6 +82,8 @@ class WipingConfig:
     pushes: Pushes | None = None
     randomisation: Randomisation | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
+    board: BoardConfig = field(default_factory=BoardConfig)
+    camera: Camera = field(default_factory=Camera)
     action: ActionConfig = field(default_factory=ActionConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
 

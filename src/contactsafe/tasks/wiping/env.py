@@ -16,7 +16,7 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
 from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
-from contactsafe.sim.world import POLICY_RATE_HZ
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
@@ -24,7 +24,7 @@ _RENDER_MODES = ["rgb_array"]
 
 
 def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
-    size = config.world.camera.size
+    size = config.camera.size
     observation = gymnasium.spaces.Dict(
         {
             **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in OBSERVED.items()},
@@ -73,7 +73,7 @@ class _Wiping(Independent):
     @property
     def camera_homography(self) -> np.ndarray:
         """Board-plane coordinates (x, y, 1), m, to mask pixels (u, v, w), (3, 3)."""
-        return self.tasks.worlds.homography
+        return self.tasks.boards.homography
 
     def _check_order(self, doing: str) -> None:
         if self._is_closed:
@@ -83,7 +83,7 @@ class _Wiping(Independent):
 
     def _picture(self, i: int) -> np.ndarray:
         """Give mask i as an image, uint8 (512, 512, 3)."""
-        return np.kron(self.tasks.worlds.masks[i], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
+        return np.kron(self.tasks.boards.masks[i], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
 
 
 def _drawing_of(options: dict[str, Any] | None, *others: str) -> Any:

@@ -1,8 +1,8 @@
 """N wiping tasks stepped together: what the single and the vector environment share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,25 +17,28 @@ from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
-from contactsafe.sim.camera import camera_at
+from contactsafe.sim.backend import Backend
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.drawings import paint_board
-from contactsafe.sim.ink import nearest_ink
 from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
-from contactsafe.sim.variation import Variation
-from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
+from contactsafe.sim.worlds import POLICY_RATE_HZ, Worlds, ticks_of_step
 from contactsafe.tasks.base.pushes import Pusher
+from contactsafe.tasks.wiping.board import furnish, pad_half
+from contactsafe.tasks.wiping.camera import camera_at
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.step import REWARD_TERMS, observe, rewards_dtype, step_tasks, task_dtype
+from contactsafe.tasks.wiping.drawings import paint_board
+from contactsafe.tasks.wiping.ink import nearest_ink
+from contactsafe.tasks.wiping.step import REWARD_TERMS, act, finish, observe, rewards_dtype, task_dtype
+from contactsafe.tasks.wiping.variation import Variation
+from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 
-def _sight(config: WipingConfig, worlds: Worlds):
+def _sight(config: WipingConfig, worlds: Worlds, boards: Whiteboards):
     """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
     if config.sight == "mask":
         return None
     from contactsafe.tasks.wiping.photographs import PhotographSource
 
-    return PhotographSource(worlds)
+    return PhotographSource(worlds, boards)
 
 
 def _checked(config: WipingConfig | None) -> WipingConfig:
@@ -65,8 +68,8 @@ class WipingTasks(Independent):
         step_limit: policy steps of an episode.
     """
 
-    world_type: type[Worlds] = Worlds
-    """What simulates; another engine's tasks name theirs."""
+    backend: ClassVar[Callable[..., Backend] | None] = None
+    """What computes the physics in place of MuJoCo."""
 
     varies = True
     """Whether episodes may differ by more than what is drawn on the board."""
@@ -85,13 +88,16 @@ class WipingTasks(Independent):
         if ranges is not None and not self.varies:
             raise InvalidInputError("randomisation is given, and this engine knows none; leave it out, or use MuJoCo")
         own_models = {} if ranges is None else {"shared": False}
-        self.worlds = self.world_type(self.arm, worlds or self.config.world, controller, n, seed, **own_models)
-        self._variation = None if ranges is None else Variation(self.worlds, ranges)
+        given = worlds or [self.config.world] * n
+        furnished = [furnish(world, self.config.board) for world in given]
+        self.worlds = Worlds(self.arm, furnished, controller, n, seed, backend=self.backend, **own_models)
+        self.boards = Whiteboards(self.config.board, self.config.camera, self.worlds.models, pad_half(self.arm))
+        self._variation = None if ranges is None else Variation(self.worlds, self.boards, ranges)
         self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
         self.tasks = np.zeros(n, dtype=task_dtype)
-        self._sight = _sight(self.config, self.worlds)
+        self._sight = _sight(self.config, self.worlds, self.boards)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
-        self._limits = action_limits(self.config.action, self.config.world.board.centre)
+        self._limits = action_limits(self.config.action, self.config.board.centre)
         self._rewards = np.zeros(1, dtype=rewards_dtype)
         for name in (*REWARD_TERMS, "force_limit_n", "gentle_n"):
             self._rewards[name] = getattr(self.config.reward, name)
@@ -111,7 +117,7 @@ class WipingTasks(Independent):
             start: tool position, (3,), m; drawn at random where None.
         """
         config, worlds = self.config, self.worlds
-        board = worlds.boards[i]
+        board = self.boards.boards[i]
         board.clear()
         if drawing is None:
             paint_board(board, config.boards, rng)
@@ -119,9 +125,7 @@ class WipingTasks(Independent):
             board.draw(drawing)
         if start is None:
             reach = config.start_reach
-            start = np.add(
-                config.world.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)]
-            )
+            start = np.add(config.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)])
         if self._variation is not None:
             self._variation.draw(i, rng)
         worlds.reset(i, self.posture_over(Pose(np.asarray(start, dtype=float), DOWN)))
@@ -134,10 +138,15 @@ class WipingTasks(Independent):
         controller["output"]["position"] = controller["dynamics"]["position"]
         controller["output"]["rotation"] = controller["dynamics"]["rotation"]
         task = self.tasks[i]
-        plant = worlds.plants[i]
-        worlds.enter_ink(i)
+        self.boards.enter_ink(i)
+        record = self.boards.records[i]
         ink, distance = nearest_ink(
-            worlds.ink_index, i, worlds.cells[i], plant["origin"], plant["cell"], controller["output"]["position"]
+            self.boards.ink_index,
+            i,
+            self.boards.cells[i],
+            record["origin"],
+            record["cell"],
+            controller["output"]["position"],
         )
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
@@ -146,13 +155,15 @@ class WipingTasks(Independent):
 
     def observe(self, i: int) -> None:
         """Look again at world i, after its board was changed by hand."""
-        self.worlds.enter_ink(i)
+        self.boards.enter_ink(i)
         self._look_first(i)
 
     def _look_first(self, i: int) -> None:
-        worlds, task = self.worlds, self.tasks[i]
-        camera = camera_at(worlds.cameras, worlds.plants[i]["camera"])
-        observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ink_index.shown[i], task, worlds.masks[i])
+        worlds, boards, task = self.worlds, self.boards, self.tasks[i]
+        camera = camera_at(boards.cameras, boards.records[i]["camera"])
+        observe(
+            worlds.records[i]["plant"], worlds.controllers[i], camera, boards.ink_index.shown[i], task, boards.masks[i]
+        )
         if self._sight is not None:
             self._sight.look(i, i + 1, self.tasks)
         if self._variation is not None:
@@ -163,7 +174,12 @@ class WipingTasks(Independent):
         parts = {} if self._variation is None else {"variation": of_object(self._variation)}
         if self._pusher is not None:
             parts["pushes"] = of_generators(self._pusher.rngs)
-        return {**parts, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks, {"light": (0, 2**31)})}
+        return {
+            **parts,
+            "worlds": of_object(self.worlds),
+            "boards": of_object(self.boards),
+            "tasks": of_records(self.tasks, {"light": (0, 2**31)}),
+        }
 
     def snapshot(self) -> dict[str, Any]:
         """Take all that decides the tasks' future, as plain values and arrays."""
@@ -199,19 +215,19 @@ class WipingTasks(Independent):
 
     def _advance(self, ticks: np.ndarray, traces: np.ndarray) -> None:
         """Run one policy step of so many ticks, (n,), under `self._actions`, and look."""
-        worlds = self.worlds
-        worlds.enter_changed()
+        worlds, boards = self.worlds, self.boards
+        boards.enter_changed()
 
-        def share(start: int, stop: int) -> None:
-            noise = worlds.sample_noise(start, stop)
-            step_tasks(
-                start, stop, worlds.plants, worlds.controllers, worlds.cells, noise, ticks, worlds.reports, traces,
-                worlds.cameras, worlds.ink_index, self._limits, self._rule, self._actions, self._rewards[0],
-                self.tasks, worlds.masks,
+        def run(start: int, stop: int) -> None:
+            act(start, stop, worlds.controllers, self._limits, self._rule, self._actions)
+            worlds.run_some(start, stop, ticks, traces)
+            finish(
+                start, stop, worlds.records, worlds.controllers, worlds.metrics, worlds.samples, boards.records,
+                boards.cells, boards.cameras, boards.ink_index, self._rewards[0], self.tasks, boards.masks,
             )  # fmt: skip
             self._look(start, stop)
 
-        worlds.in_threads(share)
+        worlds.in_threads(run)
 
     def _look(self, start: int, stop: int) -> None:
         """Make of the masks of tasks start to stop what the policy is to see of them."""
@@ -224,7 +240,7 @@ class WipingTasks(Independent):
         """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
         return {
             **{name: self.tasks[name][i].astype(np.float32) for name in OBSERVED},
-            "mask": self.worlds.masks[i][..., None].copy(),
+            "mask": self.boards.masks[i][..., None].copy(),
         }
 
     @property

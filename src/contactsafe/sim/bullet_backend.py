@@ -1,4 +1,4 @@
-"""One arm before one whiteboard in PyBullet: a second engine, from the same description through the URDF.
+"""PyBullet as a backend: the same arm from the same description through the URDF, physics by another engine.
 
 Bullet knows no rotor inertia at a joint, so the rotors are there themselves: small flywheels on the link before each
 joint, geared to it so high that they hardly feel the link's own turning. A motor's torque then accelerates the arm as
@@ -7,44 +7,34 @@ in the MJCF to 0.4 %; gravity and the links' inertia are the MJCF's to 1e-9.
 
 import weakref
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.files import readable
+from contactsafe.core.rotation import quat_multiply, quat_to_matrix
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.description import ArmDescription, Tool
-from contactsafe.robot.mjcf import numbers
+from contactsafe.robot.mjcf import TOOL_SITE, numbers
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.scene import BOARD_HALF_THICKNESS, TABLE_HALF_SIZE, loaded, perturbed
+from contactsafe.sim.scene import build_plant, loaded, perturbed
 
 GEAR = 1000.0
 """Turns of a rotor for one of its joint."""
 
 _ROTOR_KG = 1e-6  # the links' masses of Gaz et al. contain the motors
 
-# Of each corner of the pad: MuJoCo's was measured at 4.8 kN/m; its damping ratio of 0.4, of the 7 kg that the arm
-# weighs along the board's normal, is 0.4 · 2 √(4 · 4800 · 7) / 4.
-_PAD_N_M, _PAD_NS_M = 4800.0, 73.0
+# Of each corner of the tip: MuJoCo's felt was measured at 4.8 kN/m; its damping ratio of 0.4, of the 7 kg that the arm
+# weighs along a table's normal, is 0.4 · 2 √(4 · 4800 · 7) / 4.
+_TIP_N_M, _TIP_NS_M = 4800.0, 73.0
 
-_ITERATIONS = 20  # of the solver: against 400, wiping at 10 N differs by 1 µm and 0.05 N at most
-
-MAX_CONTACTS = 32
-
-contact_dtype = np.dtype(
-    [
-        ("link", np.int64),  # 1 … n of the arm, n + 1 the tool with its pad
-        ("pad", np.int64),  # 1 where it is the pad that touches
-        ("table", np.int64),  # 1 for the table, 0 for the board
-        ("point", np.float64, (3,)),  # world, m
-        ("force", np.float64, (3,)),  # on the arm, world, N
-    ]
-)
-"""One point at which something presses on the arm."""
+_ITERATIONS = 20  # of the solver: against 400, a stroke at 10 N differs by 1 µm and 0.05 N at most
 
 
 def import_pybullet() -> Any:
@@ -63,7 +53,7 @@ def import_pybullet() -> Any:
 
 
 def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
-    """Write the arm for Bullet: the project's URDF, with rotors as links and the pad as a link of its own.
+    """Write the arm for Bullet: the project's URDF, with rotors as links and the tip as a link of its own.
 
     Args:
         description: the arm.
@@ -71,9 +61,9 @@ def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
 
     Returns:
         XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` …, massless but for what
-        `BulletPlant` gives them, and `pad`, fixed to the tool.
+        `BulletBackend` gives them, and `tip`, fixed to the tool.
     """
-    robot = ET.fromstring(arm_urdf(description, replace(tool, pad_half_size=None)))
+    robot = ET.fromstring(arm_urdf(description, replace(tool, tip=None)))
     for link in robot.iter("link"):
         if link.get("name") in (BASE_LINK, TIP_LINK):
             _inertial(link, 0.0)  # left out, Bullet would take 1 kg
@@ -83,16 +73,20 @@ def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
         rotor = ET.SubElement(robot, "joint", name=f"rotor_joint{index}", type="continuous")
         _connect(rotor, origins[f"joint{index}"], f"link{index - 1}", f"rotor{index}")
         ET.SubElement(rotor, "axis", xyz="0 0 1")
-    if tool.pad_half_size is not None:
-        pad = ET.SubElement(robot, "link", name="pad")
-        _inertial(pad, 0.0)  # it is part of the tool's
-        collision = ET.SubElement(pad, "collision")
-        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.pad_half_size[2])
+    if tool.tip is not None:
+        half_size = tool.tip.half_size
+        tip = ET.SubElement(robot, "link", name="tip")
+        _inertial(tip, 0.0)  # it is part of the tool's
+        collision = ET.SubElement(tip, "collision")
+        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - half_size[2])
         ET.SubElement(collision, "origin", xyz=numbers(centre), rpy="0 0 0")
         shape = ET.SubElement(collision, "geometry")
-        ET.SubElement(shape, "box", size=numbers(2 * half for half in tool.pad_half_size))
+        if tool.tip.shape == "box":
+            ET.SubElement(shape, "box", size=numbers(2 * half for half in half_size))
+        else:
+            ET.SubElement(shape, "cylinder", radius=numbers([half_size[0]]), length=numbers([2 * half_size[2]]))
         here = ET.Element("origin", xyz="0 0 0", rpy="0 0 0")
-        _connect(ET.SubElement(robot, "joint", name="pad_mount", type="fixed"), here, "tool", "pad")
+        _connect(ET.SubElement(robot, "joint", name="tip_mount", type="fixed"), here, "tool", "tip")
     return ET.tostring(robot, encoding="unicode")
 
 
@@ -109,18 +103,13 @@ def _connect(joint: ET.Element, origin: ET.Element | None, parent: str, child: s
     ET.SubElement(joint, "child", link=child)
 
 
-class BulletPlant(Unique):
-    """Arm, table and board in a PyBullet client of their own.
+class BulletBackend(Unique):
+    """Arm and fixtures in a PyBullet client of their own; see `contactsafe.sim.backend`.
 
     Args:
         arm: built from a description, with a tool.
-        config: plant errors, board; obstacles are not built.
+        config: plant errors, fixtures; obstacles are not built.
         tick_s: time step, s.
-
-    Attributes:
-        q, qd: joint positions and velocities, (n,), rad and rad/s.
-        close: call it to end the client.
-        contacts: array of `contact_dtype` records, of which the first `n_contacts` are in force.
 
     Raises:
         InvalidInputError: pybullet is not installed, the arm has no description, or obstacles are asked for.
@@ -142,13 +131,17 @@ class BulletPlant(Unique):
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
             )
         self._config, self._tick_s, self._n = config, tick_s, arm.n
-        self._facts = perturbed(arm.description, config.plant)
-        self._urdf = bullet_urdf(self._facts, loaded(arm.tool, config.plant))
+        self._tcp = np.array(arm.tool.tcp)
+        self._description = perturbed(arm.description, config.plant)
+        self._urdf = bullet_urdf(self._description, loaded(arm.tool, config.plant))
+        # MuJoCo's copy of the arm says where its points are and what Jacobians they have.
+        self._model = build_plant(arm, config)
+        self._data = mujoco.MjData(self._model)
+        self._first_body = self._model.body("link1").id - 1
         self._client = self._bullet.connect(self._bullet.DIRECT)
         # Ends it once, for PyBullet gives the number of a client that has ended to the next.
         self.close = weakref.finalize(self, _disconnect, self._bullet, self._client)
-        self.q, self.qd = np.zeros(arm.n), np.zeros(arm.n)
-        self.contacts, self.n_contacts = np.zeros(MAX_CONTACTS, dtype=contact_dtype), 0
+        self._torque = np.zeros(arm.n)
         self.reset(arm.home)
 
     def reset(self, q) -> None:
@@ -161,23 +154,59 @@ class BulletPlant(Unique):
             deterministicOverlappingPairs=1, physicsClientId=client,
         )  # fmt: skip
         self._build_arm()
-        self._build_table()
+        self._build_fixtures()
         for joint, rotor, angle in zip(self._joints, self._rotors, q, strict=True):
             bullet.resetJointState(self._arm, joint, float(angle), 0.0, physicsClientId=client)
             bullet.resetJointState(self._arm, rotor, 0.0, 0.0, physicsClientId=client)
-        self.q[:], self.qd[:], self.n_contacts = q, 0.0, 0
 
-    def step(self, tau) -> None:
-        """Run one tick under joint torques tau (n,), N m."""
+    def read(self, world: np.void) -> None:
+        """Fill the truth of a `world_dtype` record; its wrist sensor is one that has no weight to carry."""
+        truth, states = world["truth"], self._bullet.getJointStates(self._arm, self._joints, self._client)
+        truth["q"], truth["qd"] = [state[0] for state in states], [state[1] for state in states]
+        self._place(truth["q"])
+        site = self._data.site(TOOL_SITE)
+        truth["position"], R = site.xpos, site.xmat.reshape(3, 3)
+        truth["rotation"] = R
+        on_tool, on_tip, torque, tip_contacts, contacts = np.zeros(6), np.zeros(6), np.zeros(self._n), 0, 0
+        for link, is_tip, point, force in self._contacts():
+            torque += self._jacobian(self._first_body + link, point).T @ force
+            wrench = np.concatenate([force, np.cross(point - truth["position"], force)])
+            on_tool += wrench if link == self._n + 1 else 0.0
+            on_tip += wrench if is_tip else 0.0
+            tip_contacts, contacts = tip_contacts + is_tip, contacts + 1
+        truth["tau_contact"], truth["tip_wrench"] = torque, on_tip
+        truth["tip_contacts"], truth["arm_contacts"] = tip_contacts, contacts
+        force, moment = R.T @ on_tool[:3], R.T @ on_tool[3:]
+        truth["wrist_force"], truth["wrist_torque"] = -force, -(moment + np.cross(self._tcp, force))
+
+    def write(self, world: np.void) -> None:
+        """Take motors, friction and push as joint torques."""
+        push = world["push"]
+        world["pushed"] = 0.0
+        if push["fraction"] > 0.0:
+            body = int(push["body"])
+            R = self._data.xmat[body].reshape(3, 3)
+            J = self._jacobian(body, self._data.xpos[body] + R @ push["point"])
+            world["pushed"] = push["fraction"] * (J.T @ push["force"])
+        self._torque[:] = world["motor"] + (world["pushed"] - world["drag"])
+
+    def step(self) -> None:
+        """Run one tick."""
         bullet, client = self._bullet, self._client
         bullet.setJointMotorControlArray(
-            self._arm, self._joints, bullet.TORQUE_CONTROL, forces=tau.tolist(), physicsClientId=client
+            self._arm, self._joints, bullet.TORQUE_CONTROL, forces=self._torque.tolist(), physicsClientId=client
         )
         bullet.stepSimulation(physicsClientId=client)
-        states = bullet.getJointStates(self._arm, self._joints, physicsClientId=client)
-        self.q[:] = [state[0] for state in states]
-        self.qd[:] = [state[1] for state in states]
-        self._read_contacts()
+
+    def _place(self, q) -> None:
+        self._data.qpos[: self._n] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+
+    def _jacobian(self, body: int, point) -> np.ndarray:
+        J = np.zeros((3, self._model.nv))
+        mujoco.mj_jac(self._model, self._data, J, None, np.ascontiguousarray(point, dtype=float), body)
+        return J[:, : self._n]
 
     def _build_arm(self) -> None:
         bullet, client = self._bullet, self._client
@@ -197,7 +226,9 @@ class BulletPlant(Unique):
         moving = sorted(self._joints + self._rotors)
         zeros = [0.0] * len(moving)
         bullet.setJointMotorControlArray(arm, moving, bullet.VELOCITY_CONTROL, forces=zeros, physicsClientId=client)
-        for joint, rotor, inertia in zip(self._joints, self._rotors, self._facts.joint_array("armature"), strict=True):
+        for joint, rotor, inertia in zip(
+            self._joints, self._rotors, self._description.joint_array("armature"), strict=True
+        ):
             # Bullet's reader takes so small an inertia for none, so it is given here.
             bullet.changeDynamics(
                 arm, rotor, mass=_ROTOR_KG, localInertiaDiagonal=[inertia / GEAR**2] * 3, physicsClientId=client
@@ -206,47 +237,49 @@ class BulletPlant(Unique):
                 arm, joint, arm, rotor, bullet.JOINT_GEAR, [0, 0, 1], [0, 0, 0], [0, 0, 0], physicsClientId=client
             )
             bullet.changeConstraint(gear, gearRatio=-1.0 / GEAR, maxForce=1e9, erp=0.0, physicsClientId=client)
-        # Numbers of `contact_dtype`: of every link that may touch, and which of them is the pad.
+        # Number of the link that each of Bullet's is part of: 1 … n of the arm, n + 1 the tool with its tip.
         self._owner = {self._links[f"link{i}"]: i for i in names} | {
-            self._links[name]: self._n + 1 for name in ("tool", "pad") if name in self._links
+            self._links[name]: self._n + 1 for name in ("tool", "tip") if name in self._links
         }
-        self._pad = self._links.get("pad", -2)
-        if self._pad >= 0:
+        self._tip = self._links.get("tip", -2)
+        if self._tip >= 0:
             bullet.changeDynamics(
-                arm, self._pad, contactStiffness=_PAD_N_M, contactDamping=_PAD_NS_M, lateralFriction=1.0,
+                arm, self._tip, contactStiffness=_TIP_N_M, contactDamping=_TIP_NS_M, lateralFriction=1.0,
                 physicsClientId=client,
             )  # fmt: skip
 
-    def _build_table(self) -> None:
-        board = self._config.board
-        x, y, z = board.centre
-        board_half = (board.size[0] / 2, board.size[1] / 2, BOARD_HALF_THICKNESS)
-        self._table = self._box((x, 0.0, z - (2 * BOARD_HALF_THICKNESS + TABLE_HALF_SIZE[2])), TABLE_HALF_SIZE)
-        self._board = self._box((x, y, z - BOARD_HALF_THICKNESS), board_half)
-        for link in (-1, self._links["link0"]):  # the base stands on the table
-            for body in (self._table, self._board):
-                self._bullet.setCollisionFilterPair(self._arm, body, link, -1, 0, physicsClientId=self._client)
+    def _build_fixtures(self) -> None:
+        for fixture in self._config.fixtures:
+            R = quat_to_matrix(np.array(fixture.quat))
+            for box in fixture.boxes:
+                quat = quat_multiply(np.array(fixture.quat), np.array(box.quat))
+                body = self._box(np.array(fixture.position) + R @ np.array(box.centre), box.half_size, quat)
+                for link in (-1, self._links["link0"]):  # the base stands on the table
+                    self._bullet.setCollisionFilterPair(self._arm, body, link, -1, 0, physicsClientId=self._client)
 
-    def _box(self, centre, half_size) -> int:
+    def _box(self, centre, half_size, quat) -> int:
         bullet, client = self._bullet, self._client
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=list(half_size), physicsClientId=client)
-        body = bullet.createMultiBody(0.0, shape, basePosition=list(centre), physicsClientId=client)
+        w, x, y, z = quat
+        body = bullet.createMultiBody(
+            0.0, shape, basePosition=list(centre), baseOrientation=[x, y, z, w], physicsClientId=client
+        )
         # Bullet multiplies the coefficients of the two that touch.
-        bullet.changeDynamics(body, -1, lateralFriction=self._config.board.friction, physicsClientId=client)
+        bullet.changeDynamics(body, -1, lateralFriction=self._config.tip.friction, physicsClientId=client)
         return int(body)
 
-    def _read_contacts(self) -> None:
-        """Collect the points that press on the arm; Bullet also lists those that nearly touch."""
-        count = 0
-        for point in self._bullet.getContactPoints(bodyA=self._arm, physicsClientId=self._client):
-            normal_n, owner = point[9], self._owner.get(point[3], 0)
-            if normal_n <= 0.0 or owner == 0 or count == MAX_CONTACTS:
-                continue
-            force = normal_n * np.array(point[7]) + point[10] * np.array(point[11]) + point[12] * np.array(point[13])
-            row = (owner, point[3] == self._pad, point[2] == self._table, point[5], force)
-            self.contacts[count] = row
-            count += 1
-        self.n_contacts = count
+    def _contacts(self) -> Iterator[tuple[int, bool, np.ndarray, np.ndarray]]:
+        """Iterate over the points that press on the arm: link, whether it is the tip, point, m, force on the arm, N.
+
+        Bullet also lists those that nearly touch.
+        """
+        for found in self._bullet.getContactPoints(bodyA=self._arm, physicsClientId=self._client):
+            normal_n, owner = found[9], self._owner.get(found[3], 0)
+            if normal_n > 0.0 and owner > 0:
+                force = (
+                    normal_n * np.array(found[7]) + found[10] * np.array(found[11]) + found[12] * np.array(found[13])
+                )
+                yield owner, found[3] == self._tip, np.array(found[5]), force
 
 
 def _disconnect(bullet: Any, client: int) -> None:
