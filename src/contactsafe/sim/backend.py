@@ -27,6 +27,12 @@ class Backend(Protocol):
     def step(self) -> None:
         """Advance by one tick."""
 
+    def place_fixture(self, name: str, position: np.ndarray, quat: np.ndarray) -> None:
+        """Put a fixture elsewhere, world, m and w x y z, from the next reset on."""
+
+    def set_tip_friction(self, friction: float) -> None:
+        """Give the tool's tip another Coulomb coefficient, from the next reset on."""
+
     def close(self) -> None:
         """Let go of what the engine holds."""
 

@@ -198,6 +198,20 @@ class BulletBackend(Unique):
         )
         bullet.stepSimulation(physicsClientId=client)
 
+    def place_fixture(self, name: str, position: np.ndarray, quat: np.ndarray) -> None:
+        """Put a fixture elsewhere, from the next reset on."""
+        fixtures = [
+            replace(fixture, position=tuple(position.tolist()), quat=tuple(quat.tolist()))
+            if fixture.name == name
+            else fixture
+            for fixture in self._config.fixtures
+        ]
+        self._config = replace(self._config, fixtures=tuple(fixtures))
+
+    def set_tip_friction(self, friction: float) -> None:
+        """Give the tool's tip another Coulomb coefficient, from the next reset on."""
+        self._config = replace(self._config, tip=replace(self._config.tip, friction=friction))
+
     def _place(self, q) -> None:
         self._data.qpos[: self._n] = q
         mujoco.mj_kinematics(self._model, self._data)

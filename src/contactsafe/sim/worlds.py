@@ -14,6 +14,7 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim import mujoco_backend
 from contactsafe.sim.backend import Backend, run_backend
 from contactsafe.sim.config import WorldConfig
@@ -278,6 +279,26 @@ class Worlds(Independent):
         if trace is not None and (trace.ndim != 2 or trace.shape[0] != self.n or trace.shape[1] < most):
             raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
         return ticks
+
+    def place_fixture(self, i: int, name: str, position, quat) -> None:
+        """Put a fixture of world i elsewhere; its worlds must not share their models. Reset the world next.
+
+        Args:
+            i: which world.
+            name: of the fixture.
+            position: of its frame, world, (3,), m.
+            quat: its orientation, w x y z, (4,).
+        """
+        body = self.models[i].body(name).id
+        self.models[i].body_pos[body], self.models[i].body_quat[body] = position, quat
+        if self.backends:
+            self.backends[i].place_fixture(name, np.asarray(position, float), np.asarray(quat, float))
+
+    def set_tip_friction(self, i: int, friction: float) -> None:
+        """Give the tip of world i's tool another Coulomb coefficient; reset the world next."""
+        self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
+        if self.backends:
+            self.backends[i].set_tip_friction(friction)
 
     def push(self, i: int, body: str, point, force, start_s: float, stop_s: float, ramp_s: float = 0.02) -> None:
         """Push a link of world i.

@@ -3,3 +3,4 @@
 from contactsafe.tasks.base.registry import register_task
 
 register_task("wiping", "contactsafe.tasks.wiping.tasks:WipingTasks")
+register_task("insertion", "contactsafe.tasks.insertion.tasks:InsertionTasks")
