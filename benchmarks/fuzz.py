@@ -281,7 +281,7 @@ def checkpoints(seed: int, items: range):
     from contactsafe.learning.run import Run, load_run
     from contactsafe.learning.train_policy import _encoded, _Eyes
     from contactsafe.learning.train_vae import VaeConfig, train_vae
-    from contactsafe.sim.randomisation import Randomisation
+    from contactsafe.tasks.wiping.randomisation import Randomisation
     from contactsafe.tasks.base.pushes import Pushes
     from contactsafe.tasks.wiping.config import WipingConfig
 

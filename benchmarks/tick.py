@@ -38,7 +38,7 @@ def record(path: Path) -> None:
     """Record a sweep into an obstacle and what follows."""
     from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
     from contactsafe.experiments.motions import record as run
-    from contactsafe.sim.world import Worlds
+    from contactsafe.sim.worlds import Worlds
 
     arm, seed, contact = cs.robots.panda(), 0, False
     while not contact:

@@ -23,9 +23,9 @@ from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.policy.dither import Scan
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
-from contactsafe.sim.camera import camera_at, render_mask_into
-from contactsafe.sim.ink import nearest_ink, remove_erased
-from contactsafe.sim.randomisation import Randomisation
+from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
+from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
+from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
 from contactsafe.tasks.wiping.config import WipingConfig
 

@@ -26,8 +26,8 @@ from contactsafe.experiments.motions import Playback, record
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.shape import link_frames
 from contactsafe.sim.config import NO_NOISE, Obstacle, PlantConfig, WorldConfig
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 ARM = cs.robots.panda()
 STILL = np.zeros(ARM.n)

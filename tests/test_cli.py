@@ -18,7 +18,7 @@ from contactsafe.core.parse import parse
 from contactsafe.experiments.config import PLANTS
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.sim.drawings import BOARDS
+from contactsafe.tasks.wiping.drawings import BOARDS
 from contactsafe.tasks import ENGINES
 from contactsafe.tasks.base.evaluation import FIGURES
 from contactsafe.tasks.wiping.config import Sight

@@ -31,9 +31,9 @@ from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
-from contactsafe.sim.randomisation import Randomisation
-from contactsafe.sim.whiteboard import Whiteboard
-from contactsafe.sim.world import Worlds
+from contactsafe.tasks.wiping.randomisation import Randomisation
+from contactsafe.tasks.wiping.whiteboard import Whiteboard
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.env import WipingEnv

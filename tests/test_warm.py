@@ -20,7 +20,7 @@ from numba.core import event
 import contactsafe as cs
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.robot.ik import InverseKinematics
-from contactsafe.sim.randomisation import Randomisation
+from contactsafe.tasks.wiping.randomisation import Randomisation
 
 class Count(event.Listener):
     count = 0

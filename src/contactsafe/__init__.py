@@ -4,6 +4,7 @@ from contactsafe.core import process as _process  # noqa: F401  first, for the i
 from contactsafe.core import telemetry as _telemetry  # noqa: F401  before any dependency is imported
 
 # isort: split
+from contactsafe import tasks as _tasks  # noqa: F401  which Gymnasium then knows
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
@@ -11,9 +12,6 @@ from contactsafe.core.errors import ContactSafeError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.payload import Payload
-from contactsafe.tasks import register as _register
-
-_register()
 
 __version__ = "0.1.0"
 

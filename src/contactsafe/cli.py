@@ -23,9 +23,9 @@ from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
 from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.policy.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
-from contactsafe.sim.drawings import Boards
 from contactsafe.tasks import ENGINES
 from contactsafe.tasks.wiping.config import Sight, WipingConfig
+from contactsafe.tasks.wiping.drawings import Boards
 from contactsafe.tasks.wiping.scripted import REFERENCES
 
 _COMPILES = "the first run compiles for a minute or two"
@@ -156,11 +156,11 @@ def evaluate(
         json: print JSON instead of a table.
     """
     from contactsafe.policy.policy import Policy
-    from contactsafe.sim.randomisation import Randomisation
     from contactsafe.tasks import make_engine
     from contactsafe.tasks.base.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
     from contactsafe.tasks.base.pushes import Pushes
     from contactsafe.tasks.wiping import scripted as references
+    from contactsafe.tasks.wiping.randomisation import Randomisation
 
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
@@ -297,7 +297,7 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
 
     from contactsafe.learning.algorithms import ALGORITHMS
     from contactsafe.learning.train_policy import train_policy
-    from contactsafe.sim.randomisation import Randomisation
+    from contactsafe.tasks.wiping.randomisation import Randomisation
 
     config = _settings(ALGORITHMS[algorithm], f"contactsafe train {algorithm}", arguments)
     task = WipingConfig(randomisation=Randomisation.broad() if config.randomise else None)

@@ -16,10 +16,10 @@ from contactsafe.robot.arm import Arm, arm_from_description
 from contactsafe.robot.franka import HAND
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import panda
-from contactsafe.sim.randomisation import Randomisation
-from contactsafe.sim.world import Worlds
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks import ENGINES
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.tasks.wiping.sampling import MaskSampler
 from contactsafe.vision.rectify import rectify
 

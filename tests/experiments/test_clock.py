@@ -10,7 +10,7 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.late_worlds import FROZEN, LOST, NO_CALL, SEEN, LateWorlds
 from contactsafe.robot import robots
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
-from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.truth import trace_dtype
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from contactsafe.experiments.motions import record
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.robot import robots
 from contactsafe.sim.config import Obstacle
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import Worlds
 
 TWO = {"vices": presets.vices(), "safe": presets.safe()}
 

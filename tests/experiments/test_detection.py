@@ -30,8 +30,8 @@ from contactsafe.experiments.detection import (
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.robot import robots
 from contactsafe.sim.config import NO_NOISE, WorldConfig
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 ARM = robots.panda()
 PUSH = Push(5, np.zeros(3), np.array([0.0, 20.0, 0.0]), np.array([3.0, 0, 0, 0, 0.5, 0, 0]))

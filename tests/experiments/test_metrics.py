@@ -9,7 +9,7 @@ from contactsafe.experiments.disturbance import PUSH_N, PUSH_POINTS, PUSH_S, dev
 from contactsafe.experiments.joint_safety import _worth_showing, contact_metrics
 from contactsafe.experiments.results import Recording
 from contactsafe.experiments.task_safety import wiping_metrics
-from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.truth import trace_dtype
 
 
 def trace(ticks):

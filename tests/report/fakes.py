@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.truth import trace_dtype
 
 CONTROLLERS = ("vices", "paper", "safe")
 STEADY_N = {"vices": 60.0, "paper": 33.0, "safe": 9.0}

@@ -6,11 +6,11 @@ from numpy.testing import assert_allclose
 
 from contactsafe.robot.description import Inertia
 from contactsafe.robot.fr3 import FR3
-from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
 
 ARMS = pytest.mark.parametrize("description", [PANDA, FR3], ids=lambda description: description.name)
-BODIES = {"hand": HAND.inertia, "pad": WIPING_PAD.inertia}
+BODIES = {"hand": HAND.inertia, "pad": WIPER.inertia}
 for arm in (PANDA, FR3):
     BODIES |= {f"{arm.name} base": arm.base}
     BODIES |= {f"{arm.name} link{index}": link.inertia for index, link in enumerate(arm.links, start=1)}
@@ -71,4 +71,4 @@ def test_two_points_make_a_dumbbell():
 
 
 def test_the_pad_hangs_on_the_hand():
-    assert WIPING_PAD.inertia.mass == pytest.approx(HAND.inertia.mass + 0.1)
+    assert WIPER.inertia.mass == pytest.approx(HAND.inertia.mass + 0.1)

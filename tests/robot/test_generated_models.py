@@ -51,7 +51,7 @@ def test_rotor_inertia_is_in_the_mjcf(panda):
     assert_array_equal(panda.model.dof_armature, panda.description.joint_array("armature"))
 
 
-@pytest.mark.parametrize(("tool", "beyond_flange"), [(robots.HAND, 0.1034), (robots.WIPING_PAD, 0.130)])
+@pytest.mark.parametrize(("tool", "beyond_flange"), [(robots.HAND, 0.1034), (robots.WIPER, 0.130)])
 def test_panda_at_home_stands_where_its_drawing_says(tool, beyond_flange):
     """Home leans the upper arm back by 45°, holds the forearm level and points the tool down."""
     s = math.sin(math.pi / 4)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.shape import arm_capsules, pad_box
+from contactsafe.robot.shape import arm_capsules, tip_box
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def postures():
     return np.random.default_rng(0).uniform(low, high, (25, 7))
 
 
-@pytest.mark.parametrize("tool", [WIPING_PAD, HAND], ids=["pad", "hand"])
+@pytest.mark.parametrize("tool", [WIPER, HAND], ids=["pad", "hand"])
 def test_capsules_are_mujocos(postures, tool):
     model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, tool))
     data = mujoco.MjData(model)
@@ -37,9 +37,9 @@ def test_capsules_are_mujocos(postures, tool):
 
 
 def test_pad_is_mujocos(postures):
-    model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, WIPING_PAD))
+    model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, WIPER))
     data = mujoco.MjData(model)
-    centre, half, rotation = pad_box(PANDA, WIPING_PAD, postures)
+    centre, half, rotation = tip_box(PANDA, WIPER, postures)
     np.testing.assert_allclose(half, model.geom("pad").size)
     for i, q in enumerate(postures):
         data.qpos[:] = q
@@ -50,9 +50,9 @@ def test_pad_is_mujocos(postures):
 
 def test_wrong_shape_is_refused():
     with pytest.raises(InvalidInputError, match=r"q has shape \(7,\); give F × 7 joint positions, one row a posture"):
-        arm_capsules(PANDA, WIPING_PAD, np.zeros(7))
+        arm_capsules(PANDA, WIPER, np.zeros(7))
 
 
 def test_tool_without_pad_is_refused():
     with pytest.raises(InvalidInputError, match="tool 'franka hand' has no pad"):
-        pad_box(PANDA, HAND, np.zeros((1, 7)))
+        tip_box(PANDA, HAND, np.zeros((1, 7)))

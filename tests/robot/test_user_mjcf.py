@@ -125,7 +125,7 @@ def test_bound_motors_exert_the_torque_asked_for(scene):
     assert_allclose(np.delete(data.qfrc_actuator, at.dof), 0.0, atol=0)
 
 
-@pytest.mark.parametrize("tool", [robots.HAND, robots.WIPING_PAD], ids=lambda tool: tool.name)
+@pytest.mark.parametrize("tool", [robots.HAND, robots.WIPER], ids=lambda tool: tool.name)
 def test_round_trip_through_a_file(tmp_path, tool):
     panda = robots.panda(tool)
     path = tmp_path / "panda.xml"

@@ -13,7 +13,7 @@ from tests.sim.scenes import panda
 
 from contactsafe.robot.mjcf import ARM_CONTYPE, numbers
 from contactsafe.sim.scene import scene_mjcf
-from contactsafe.sim.whiteboard import INK
+from contactsafe.tasks.wiping.whiteboard import INK
 
 _TIMES = 8  # sub-pixels along a pixel's edge
 _THICK = 1e-5  # m

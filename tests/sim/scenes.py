@@ -10,8 +10,8 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.config import NO_NOISE, WorldConfig
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 """A tool that points straight down, w x y z."""

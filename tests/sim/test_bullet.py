@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, aim, panda, posture, run, worlds_at
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.bullet import BulletPlant, import_pybullet
+from contactsafe.sim.bullet_backend import BulletPlant, import_pybullet
 from contactsafe.sim.bullet_worlds import BulletWorlds
 from contactsafe.sim.config import BoardConfig, PlantConfig, WorldConfig, bottle
-from contactsafe.sim.world import TICK_S, Worlds
+from contactsafe.sim.worlds import TICK_S, Worlds
 
 pytest.importorskip("pybullet")
 

@@ -9,10 +9,10 @@ from scipy import ndimage
 from sklearn.datasets import load_digits
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim import handwriting
+from contactsafe.tasks.wiping import handwriting
 from contactsafe.sim.config import BoardConfig
-from contactsafe.sim.drawings import BOARDS, paint_board
-from contactsafe.sim.whiteboard import INK, Whiteboard
+from contactsafe.tasks.wiping.drawings import BOARDS, paint_board
+from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard
 
 CONFIG = BoardConfig()
 WRITTEN = [kind for kind in BOARDS if kind != "strokes"]

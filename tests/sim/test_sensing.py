@@ -10,7 +10,7 @@ from tests.sim.scenes import BOARD_Z, CALM, aim, contact_wrench, panda, posture,
 from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, PlantConfig, SensorConfig, WorldConfig
-from contactsafe.sim.records import noise_channels
+from contactsafe.sim.truth import noise_channels
 from contactsafe.sim.scene import build_plant
 from contactsafe.sim.stepping import sense
 

@@ -8,7 +8,7 @@ from tests.sim.scenes import aim, panda, posture, run
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import REAL_SENSORS, Obstacle, PlantConfig, WorldConfig
-from contactsafe.sim.world import Worlds
+from contactsafe.sim.worlds import Worlds
 
 PRESSED, ABOVE = (0.5, 0.0, 0.004), (0.55, 0.05, 0.06)
 TRAVELLER = Obstacle((0.45, 0.3, 0.25), 0.05, 3000.0, travel=(0.0, -0.2, 0.0), travel_s=(0.02, 0.2), travel_until_n=8.0)

@@ -15,9 +15,9 @@ from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, SensorConfig, WorldConfig
-from contactsafe.sim.records import trace_dtype
+from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.stepping import act, sense
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 TICKS = 36 * MAX_TICKS
 START, GOAL = (0.5, 0.0, BOARD_Z + 0.004), (0.5, -0.12, BOARD_Z - 0.006)

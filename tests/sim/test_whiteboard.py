@@ -9,7 +9,7 @@ from tests.sim.scenes import BOARD_Z, CALM, aim, run, worlds_at
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
-from contactsafe.sim.whiteboard import CLEAN, INK, OBJECT, Whiteboard, erase_under_pad
+from contactsafe.tasks.wiping.whiteboard import CLEAN, INK, OBJECT, Whiteboard, erase_under_pad
 
 CONFIG = BoardConfig()
 HALF_X, HALF_Y = 0.045, 0.035

@@ -29,7 +29,7 @@ from contactsafe.experiments.run import Progress
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import Obstacle
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 QUESTION = (
     "Ticks come late, measurements are lost, frozen, repeated or impossible, the rate is another, the policy falls "

@@ -17,7 +17,7 @@ from contactsafe.experiments.run import Progress
 from contactsafe.experiments.verdict import verdict_table, worst_tables
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.world import Worlds
+from contactsafe.sim.worlds import Worlds
 
 QUESTION = (
     "The tool sweeps or holds, wiping or in free air, and a random point of the arm meets something soft or stiff: "

@@ -24,8 +24,8 @@ from contactsafe.experiments.run import Progress
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.shape import link_frames
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, POLICY_RATE_HZ, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ, Worlds
 
 QUESTION = (
     "A random point of links 3 to 7 is pushed while the arm moves, its plant and sensors with errors: how soon is a "

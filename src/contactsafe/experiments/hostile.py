@@ -13,8 +13,8 @@ from contactsafe.experiments.run import Progress
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import REAL_SENSORS, Obstacle, WorldConfig
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 QUESTION = (
     "Targets are random, extreme, jump, and hold numbers that are none, among things in the arm's way: are torque, "

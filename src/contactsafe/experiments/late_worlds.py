@@ -12,9 +12,9 @@ from contactsafe.experiments.collision_scenes import Motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.records import trace_dtype
 from contactsafe.sim.stepping import act, begin_step_metrics, end_tick, sense
-from contactsafe.sim.world import MAX_TICKS, Worlds
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 SEEN, NO_CALL, LOST, FROZEN, VELOCITY_JUMPS, POSITION_JUMPS, NUDGED = range(7)
 """What may happen at a tick: nothing, the controller is not called, or its measurement is not what it should be."""

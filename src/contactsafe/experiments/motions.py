@@ -8,8 +8,8 @@ import numpy as np
 from contactsafe.core.copying import Independent
 from contactsafe.experiments.collision_scenes import LEAD_M, Motion
 from contactsafe.robot.ik import solve_ik
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, Worlds, ticks_of_step
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, Worlds, ticks_of_step
 
 
 class Playback(Independent):

@@ -8,8 +8,8 @@ from contactsafe.core.errors import BundleError
 from contactsafe.experiments.results import Recording
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
-from contactsafe.sim.records import trace_dtype
-from contactsafe.sim.world import MAX_TICKS, POLICY_RATE_HZ
+from contactsafe.sim.truth import trace_dtype
+from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
 from contactsafe.tasks.wiping.tasks import WipingTasks
 

@@ -11,9 +11,9 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.native import mj_step
 from contactsafe.policy.observation import ACTION_SIZE
 from contactsafe.policy.policy import Policy
-from contactsafe.sim.camera import render_mask_into
-from contactsafe.sim.records import noise_channels
 from contactsafe.sim.stepping import run_ticks
+from contactsafe.sim.truth import noise_channels
+from contactsafe.tasks.wiping.camera import render_mask_into
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 

@@ -77,3 +77,10 @@ def observed_target(c, pose, out):
         out[3 + i] = rotvec[i] - pose[3 + i]
     out[6:12] = c.target.K_task
     out[12:18] = c.target.D_task
+
+
+@compiled(nogil=True)
+def act(start, stop, controllers, limits, rule, actions):
+    """Move the targets of the controllers from start to stop by their actions; see `apply_action`."""
+    for i in range(start, stop):
+        apply_action(controllers[i], limits, rule, actions[i])

@@ -130,9 +130,9 @@ def _arm(subject: Subject) -> dict:
         for capsule in group
     ]
     pad = None
-    if tool.pad_half_size is not None:
+    if tool.tip.half_size is not None:
         x, y, z = tool.tcp
-        pad = {"centre": (x, y, z - tool.pad_half_size[2]), "half": tool.pad_half_size}
+        pad = {"centre": (x, y, z - tool.tip.half_size[2]), "half": tool.tip.half_size}
     return {"frames": frames, "capsules": capsules, "pad": pad}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from contactsafe.report.data import Recording
 from contactsafe.robot.description import ArmDescription, Tool
-from contactsafe.robot.shape import arm_capsules, pad_box
+from contactsafe.robot.shape import arm_capsules, tip_box
 from contactsafe.sim.config import BoardConfig
 
 INK, OBJECT = 1, 2
@@ -125,8 +125,8 @@ def picture(subject: Subject, view: View, recording: Recording, tick: int, width
         view.project(starts[0], width, height), view.project(ends[0], width, height), radii, strict=True
     ):
         things.append(((a[2] + b[2]) / 2, _capsule(a, b, scale * r)))
-    if subject.tool.pad_half_size is not None:
-        centre, half, rotation = pad_box(subject.arm, subject.tool, q)
+    if subject.tool.tip.half_size is not None:
+        centre, half, rotation = tip_box(subject.arm, subject.tool, q)
         box = view.project(centre[0] + (_CORNERS * half) @ rotation[0].T, width, height)
         things.append((box[:, 2].mean(), _box(box)))
     if recording.obstacle is not None:

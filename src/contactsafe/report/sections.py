@@ -13,11 +13,11 @@ from contactsafe.report.film import film_json
 from contactsafe.report.plots import Curve, Panel, Plotter, spans
 from contactsafe.report.scene import Subject
 from contactsafe.report.summary import versions
-from contactsafe.robot.panda import PANDA, WIPING_PAD
+from contactsafe.robot.panda import PANDA, WIPER
 from contactsafe.sim.config import BoardConfig
 from contactsafe.tasks.base.evaluation import CONTACT_N
 
-SUBJECT = Subject(PANDA, WIPING_PAD, BoardConfig())
+SUBJECT = Subject(PANDA, WIPER, BoardConfig())
 """What the experiments simulate."""
 
 ABOUT = {

@@ -1,6 +1,7 @@
 """What an arm is, as data: frames, masses, limits, friction and shape, each robot with its sources."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -101,6 +102,19 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Tip:
+    """The part of a tool that works: a box or an upright cylinder whose lower face is centred on the TCP.
+
+    Attributes:
+        half_size: half edges along x, y, z, m; a cylinder's radius twice, then half its length.
+        shape: 'box' or 'cylinder'.
+    """
+
+    half_size: Vector3
+    shape: Literal["box", "cylinder"] = "box"
+
+
+@dataclass(frozen=True)
 class Tool:
     """What the flange carries.
 
@@ -109,14 +123,14 @@ class Tool:
         inertia: in the mount frame.
         tcp: the end-effector point in the mount frame, m; its axes are the mount frame's.
         capsules: shape, in the mount frame.
-        pad_half_size: half edges of a box pad whose lower face is centred on the TCP, m; None without a pad.
+        tip: the part that works; None where no part is meant to.
     """
 
     name: str
     inertia: Inertia
     tcp: Vector3
     capsules: tuple[Capsule, ...]
-    pad_half_size: Vector3 | None = None
+    tip: Tip | None = None
 
 
 @dataclass(frozen=True)

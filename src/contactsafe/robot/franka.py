@@ -6,7 +6,7 @@ coarse collision shapes of franka_description.
 
 import math
 
-from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tool
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tip, Tool
 
 _HALF = math.sqrt(0.5)
 _UP = (1.0, 0.0, 0.0, 0.0)
@@ -90,13 +90,13 @@ def _block(mass: float, centre: tuple[float, float, float], half: tuple[float, f
     return Inertia(mass, centre, (yy + zz, xx + zz, xx + yy, 0.0, 0.0, 0.0))
 
 
-_PAD_HALF = (0.045, 0.035, 0.025)
+_WIPER_HALF = (0.045, 0.035, 0.025)
 
-WIPING_PAD = Tool(
-    name="franka hand with wiping pad",
-    inertia=_HAND_INERTIA + _block(0.1, (0.0, 0.0, 0.105), _PAD_HALF),
+WIPER = Tool(
+    name="franka hand with wiper",
+    inertia=_HAND_INERTIA + _block(0.1, (0.0, 0.0, 0.105), _WIPER_HALF),
     tcp=(0.0, 0.0, 0.130),
     capsules=_HAND_CAPSULES,
-    pad_half_size=_PAD_HALF,
+    tip=Tip(_WIPER_HALF),
 )
 """The gripper holding a felt block of 90 × 70 × 50 mm and 0.1 kg; the TCP is the middle of its lower face."""

@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Tool
 
 TOOL_SITE = "tcp"
+TIP_GEOM = "tip"
 FLANGE_SITE = "flange"
 ARM_CONTYPE = 2
 """Collision type of the arm's geoms: they meet what has conaffinity 2, and never each other."""
@@ -68,16 +69,16 @@ def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
     )
     _inertial(mount, tool.inertia)
     _capsules(mount, "tool", tool.capsules)
-    if tool.pad_half_size is not None:
-        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.pad_half_size[2])
+    if tool.tip is not None:
+        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.tip.half_size[2])
         ET.SubElement(
             mount,
             "geom",
             {"class": "arm"},
-            name="pad",
-            type="box",
+            name=TIP_GEOM,
+            type=tool.tip.shape,
             pos=numbers(centre),
-            size=numbers(tool.pad_half_size),
+            size=numbers(tool.tip.half_size if tool.tip.shape == "box" else tool.tip.half_size[1:]),
             rgba="0.2 0.35 0.7 1",
         )
     ET.SubElement(mount, "site", name=FLANGE_SITE)

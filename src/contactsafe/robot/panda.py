@@ -7,9 +7,9 @@ in the form used by MuJoCo Menagerie. Rotor inertia is not published; 0.1 kg m²
 """
 
 from contactsafe.robot.description import Inertia, Joint
-from contactsafe.robot.franka import HAND, WIPING_PAD, franka_arm
+from contactsafe.robot.franka import HAND, WIPER, franka_arm
 
-__all__ = ["FRICTION", "HAND", "PANDA", "WIPING_PAD"]
+__all__ = ["FRICTION", "HAND", "PANDA", "WIPER"]
 
 FRICTION = (
     (0.546, 5.118, 0.0395),

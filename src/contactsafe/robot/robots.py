@@ -3,14 +3,14 @@
 from contactsafe.robot.arm import Arm, arm_from_description
 from contactsafe.robot.description import Tool
 from contactsafe.robot.fr3 import FR3
-from contactsafe.robot.franka import HAND, WIPING_PAD
+from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.user_mjcf import from_mjcf
 
-__all__ = ["HAND", "WIPING_PAD", "fr3", "from_mjcf", "panda"]
+__all__ = ["HAND", "WIPER", "fr3", "from_mjcf", "panda"]
 
 
-def panda(tool: Tool = WIPING_PAD) -> Arm:
+def panda(tool: Tool = WIPER) -> Arm:
     """Give the Franka Emika Panda.
 
     Args:
@@ -19,7 +19,7 @@ def panda(tool: Tool = WIPING_PAD) -> Arm:
     return arm_from_description(PANDA, tool)
 
 
-def fr3(tool: Tool = WIPING_PAD) -> Arm:
+def fr3(tool: Tool = WIPER) -> Arm:
     """Give the Franka Research 3.
 
     Args:

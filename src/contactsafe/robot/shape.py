@@ -1,4 +1,4 @@
-"""Where an arm's capsules and pad are: kinematics from the description alone, many postures at once, no MuJoCo."""
+"""Where an arm's capsules and tip are: kinematics from the description alone, many postures at once, no MuJoCo."""
 
 import numpy as np
 
@@ -60,24 +60,24 @@ def arm_capsules(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray
     return placed[:, :, 0], placed[:, :, 1], radii, links
 
 
-def pad_box(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place the tool's pad in the world.
+def tip_box(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place the tool's tip in the world.
 
     Args:
         description: the arm, of n joints.
-        tool: what the flange carries, with a pad.
+        tool: what the flange carries, with a box for a tip.
         q: joint positions, (F, n), rad.
 
     Returns:
         Centre, (F, 3), m; half edges, (3,), m; rotation, (F, 3, 3).
 
     Raises:
-        InvalidInputError: the tool has no pad, or q has another shape.
+        InvalidInputError: the tool's tip is no box, or q has another shape.
     """
-    if tool.pad_half_size is None:
-        raise InvalidInputError(f"tool '{tool.name}' has no pad; give one that has, such as robots.WIPING_PAD")
+    if tool.tip is None or tool.tip.shape != "box":
+        raise InvalidInputError(f"tool '{tool.name}' has no box for a tip; give one that has, such as robots.WIPER")
     origins, rotations = link_frames(description, q)
-    half = np.array(tool.pad_half_size)
+    half = np.array(tool.tip.half_size)
     centre = np.array(tool.tcp) - (0.0, 0.0, half[2])
     return origins[:, -1] + rotations[:, -1] @ centre, half, rotations[:, -1]
 

@@ -42,9 +42,13 @@ def arm_urdf(description: ArmDescription, tool: Tool) -> str:
         ET.SubElement(joint, "axis", xyz="0 0 1")
         _limit(joint, link.joint)
     mount = _link(robot, "tool", tool.inertia, tool.capsules)
-    if tool.pad_half_size is not None:
-        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.pad_half_size[2])
-        _collision(mount, centre, (0.0, 0.0, 0.0), "box", size=numbers(2 * half for half in tool.pad_half_size))
+    if tool.tip is not None:
+        half_size = tool.tip.half_size
+        centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - half_size[2])
+        size = {"size": numbers(2 * half for half in half_size)}
+        if tool.tip.shape == "cylinder":
+            size = {"radius": numbers([half_size[0]]), "length": numbers([2 * half_size[2]])}
+        _collision(mount, centre, (0.0, 0.0, 0.0), tool.tip.shape, **size)
     _joint(
         robot,
         "tool_mount",

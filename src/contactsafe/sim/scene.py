@@ -1,4 +1,4 @@
-"""MJCF of the world: the arm's body tree, table and board, obstacles on springs, and the sensors that watch them."""
+"""MJCF of a world: the arm's body tree, fixtures, obstacles on springs, and the sensors that watch them."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -10,18 +10,10 @@ import mujoco
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.description import ArmDescription, Inertia, Tool
-from contactsafe.robot.mjcf import FLANGE_SITE, arm_body, model_root, numbers
-from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, WorldConfig, per_joint
-
-_STIFF = "0.004 1"  # contact time constant, s, and damping ratio: four ticks, for hard plastic on metal
-# The pad: measured 4.8 kN/m a corner that touches, so 19 kN/m flat on the board, 10 kN/m on an edge.
-_FOAM_SOLREF, _FOAM_SOLIMP = "0.15 0.4", "0.5 0.5 0.001"
-
-TABLE_HALF_SIZE = (0.6, 0.9, 0.025)
-"""Half edges of the table, on whose upper face the board lies, m."""
-
-BOARD_HALF_THICKNESS = 0.005
-"""Half the height of the board, m."""
+from contactsafe.robot.mjcf import FLANGE_SITE, TIP_GEOM, arm_body, model_root, numbers
+from contactsafe.sim.config import PlantConfig, WorldConfig, per_joint
+from contactsafe.sim.fixtures import Fixture
+from contactsafe.sim.obstacles import Obstacle
 
 
 def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
@@ -43,23 +35,23 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     _visual(root)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0.6 -0.6 2", dir="0 0.3 -1", diffuse="0.7 0.7 0.7")
-    _board(world, config.board)
+    for fixture in config.fixtures:
+        _fixture(world, fixture)
     world.append(arm_body(perturbed(arm.description, config.plant), loaded(arm.tool, config.plant)))
-    _camera(world, config)
     for index, obstacle in enumerate(config.obstacles):
         _obstacle(world, index, obstacle)
     tool_body = next(body for body in world.iter("body") if body.get("name") == "tool")
     ET.SubElement(tool_body, "site", name="tool_com", pos=numbers(arm.tool.inertia.com))
-    if arm.tool.pad_half_size is not None:
-        pad = next(geom for geom in tool_body.iter("geom") if geom.get("name") == "pad")
-        pad.set("solref", _FOAM_SOLREF)
-        pad.set("solimp", _FOAM_SOLIMP)
-        pad.set("priority", "1")
-        pad.set("friction", numbers((config.board.friction, 0.005, 0.0001)))
+    if arm.tool.tip is not None:
+        tip = next(geom for geom in tool_body.iter("geom") if geom.get("name") == TIP_GEOM)
+        tip.set("solref", numbers(config.tip.solref))
+        tip.set("solimp", numbers(config.tip.solimp))
+        tip.set("priority", "1")
+        tip.set("friction", numbers((config.tip.friction, 0.005, 0.0001)))
     actuator = ET.SubElement(root, "actuator")
     for index in range(1, arm.n + 1):
         ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}")
-    _sensors(root, arm, len(config.obstacles))
+    _sensors(root, arm, config)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
 
@@ -105,31 +97,16 @@ def _visual(root: ET.Element) -> None:
     ET.SubElement(visual, "map", znear="0.01")
 
 
-def _board(world: ET.Element, board: BoardConfig) -> None:
-    """Add board and table, one body that may be moved: its origin is the middle of the board's face."""
-    x, y, z = board.centre
-    thickness = BOARD_HALF_THICKNESS
-    body = ET.SubElement(world, "body", name="board", pos=numbers((x, y, z)))
-    ET.SubElement(
-        body, "geom", name="table", type="box", pos=numbers((0.0, -y, -(2 * thickness + TABLE_HALF_SIZE[2]))),
-        size=numbers(TABLE_HALF_SIZE), contype="1", conaffinity="2", solref=_STIFF, rgba="0.72 0.66 0.58 1",
+def _fixture(world: ET.Element, fixture: Fixture) -> None:
+    body = ET.SubElement(
+        world, "body", name=fixture.name, pos=numbers(fixture.position), quat=numbers(fixture.quat)
     )  # fmt: skip
-    ET.SubElement(
-        body, "geom", name="board", type="box", pos=numbers((0.0, 0.0, -thickness)),
-        size=numbers((board.size[0] / 2, board.size[1] / 2, thickness)),
-        contype="1", conaffinity="2", solref=_STIFF, rgba="0.97 0.97 0.97 1",
-    )  # fmt: skip
-
-
-def _camera(world: ET.Element, config: WorldConfig) -> None:
-    camera = config.camera
-    fovy = math.degrees(2 * math.atan(camera.size / 2 / camera.focal_px))
-    target = ET.SubElement(world, "body", name="camera_target", pos=numbers(camera.target))
-    ET.SubElement(target, "site", name="camera_target")
-    ET.SubElement(
-        world, "camera", name="board_camera", mode="targetbody", target="camera_target",
-        pos=numbers(camera.position), fovy=numbers([fovy]),
-    )  # fmt: skip
+    for box in fixture.boxes:
+        ET.SubElement(
+            body, "geom", name=box.name, type="box", pos=numbers(box.centre), quat=numbers(box.quat),
+            size=numbers(box.half_size), contype="1", conaffinity="2", solref=numbers(fixture.solref),
+            rgba=numbers(box.rgba),
+        )  # fmt: skip
 
 
 def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
@@ -151,29 +128,22 @@ def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
     )  # fmt: skip
 
 
-def _sensors(root: ET.Element, arm: Arm, obstacles: int) -> None:
+def _sensors(root: ET.Element, arm: Arm, config: WorldConfig) -> None:
     sensor = ET.SubElement(root, "sensor")
     ET.SubElement(sensor, "force", name="wrist_force", site=FLANGE_SITE)
     ET.SubElement(sensor, "torque", name="wrist_torque", site=FLANGE_SITE)
     ET.SubElement(sensor, "accelerometer", name="wrist_accelerometer", site="tool_com")
-    if arm.tool is not None and arm.tool.pad_half_size is not None:
+    for index, fixture in enumerate(config.fixtures):
+        if arm.tool is not None and arm.tool.tip is not None:
+            ET.SubElement(
+                sensor, "contact", name=f"tip_fixture{index}", body1=fixture.name, geom2=TIP_GEOM, reduce="netforce",
+                data="found force torque pos",
+            )  # fmt: skip
         ET.SubElement(
-            sensor,
-            "contact",
-            name="pad_board",
-            geom1="board",
-            geom2="pad",
-            reduce="netforce",
-            data="found force torque pos",
-        )
-        ET.SubElement(
-            sensor, "contact", name="pad_table", geom1="table", geom2="pad", reduce="netforce", data="found force"
-        )
-    for geom in ("board", "table"):
-        ET.SubElement(
-            sensor, "contact", name=f"arm_{geom}", geom1=geom, subtree2="link1", reduce="netforce", data="found force"
-        )
-    for index in range(obstacles):
+            sensor, "contact", name=f"arm_fixture{index}", body1=fixture.name, subtree2="link1", reduce="netforce",
+            data="found force",
+        )  # fmt: skip
+    for index in range(len(config.obstacles)):
         ET.SubElement(
             sensor, "contact", name=f"arm_obstacle{index}", geom1=f"obstacle{index}", subtree2="link1",
             reduce="netforce", data="found force",

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
-from contactsafe.sim.records import VIEWED
+from contactsafe.sim.mujoco_record import VIEWED
 
 _READ = (*VIEWED, "cdof", "subtree_com")
 """Arrays of MjData that are read before a step fills them anew; the last two by mj_jac, for a push."""

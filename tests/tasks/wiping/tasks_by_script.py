@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.sim.whiteboard import INK
+from contactsafe.tasks.wiping.whiteboard import INK
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.camera import camera_at, render_mask
+from contactsafe.tasks.wiping.camera import camera_at, render_mask
 from contactsafe.sim.config import BoardConfig, Camera, WorldConfig
-from contactsafe.sim.ink import nearest_ink
-from contactsafe.sim.randomisation import Randomisation
-from contactsafe.sim.whiteboard import INK, OBJECT
+from contactsafe.tasks.wiping.ink import nearest_ink
+from contactsafe.tasks.wiping.randomisation import Randomisation
+from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 from contactsafe.tasks.wiping.bullet import BulletTasks
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.world import TICK_S, Worlds
+from contactsafe.sim.worlds import TICK_S, Worlds
 
 Range = tuple[float, float]
 
@@ -59,14 +59,14 @@ class Pusher(Independent):
 
     def step(self) -> None:
         """Plan the next push wherever the last is over; call it before every policy step."""
-        plants = self._worlds.plants
-        for i in np.flatnonzero(plants["tick"] >= plants["push_stop"]).tolist():
+        records = self._worlds.records
+        for i in np.flatnonzero(records["tick"] >= records["push"]["stop"]).tolist():
             self._next(i)
 
     def _next(self, i: int) -> None:
         rng, pushes = self.rngs[i], self._pushes
         direction = rng.normal(size=3)
         force = rng.uniform(*pushes.force_n) * direction / np.linalg.norm(direction)
-        start = int(self._worlds.plants[i]["tick"]) * TICK_S + rng.uniform(*pushes.pause_s)
+        start = int(self._worlds.records[i]["tick"]) * TICK_S + rng.uniform(*pushes.pause_s)
         stop = start + rng.uniform(*pushes.lasting_s)
         self._worlds.push(i, f"link{rng.choice(pushes.links)}", (0.0, 0.0, 0.0), force, start, stop)

@@ -4,11 +4,10 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.policy.action_config import ActionConfig
-from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.drawings import Boards, check_boards
-from contactsafe.sim.randomisation import Randomisation
-from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.base.config import TaskConfig
+from contactsafe.tasks.wiping.board import BoardConfig, Camera
+from contactsafe.tasks.wiping.drawings import Boards, check_boards
+from contactsafe.tasks.wiping.randomisation import Randomisation
 
 Sight = Literal["mask", "photograph"]
 
@@ -49,12 +48,10 @@ class RewardConfig:
 
 
 @dataclass(frozen=True)
-class WipingConfig:
-    """The wiping task.
+class WipingConfig(TaskConfig):
+    """The wiping task; the world's fixtures and the tip's surface are the board's.
 
     Attributes:
-        episode_s: time limit, s.
-        controller: preset by name; the free-space law is 'vices'.
         clean_fraction: share of the ink below which the board counts as clean.
         start_reach: the tool starts within this of the board's centre along x and y, m.
         start_height: range of the tool's height above the board at the start, m.
@@ -62,30 +59,25 @@ class WipingConfig:
             first need `contactsafe[handwriting]`.
         sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
             that changes with every episode; the latter needs `contactsafe[camera]`.
-        pushes: on the arm while it works; None for none.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
-        world: plant, sensors, board, camera, obstacles.
-        action: scaling and limits.
+        board: the whiteboard.
+        camera: what looks at it.
         reward: weights.
     """
 
-    episode_s: float = 20.0
-    controller: str = "safe"
     clean_fraction: float = 0.002
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"
     sight: Sight = "mask"
-    pushes: Pushes | None = None
     randomisation: Randomisation | None = None
-    world: WorldConfig = field(default_factory=WorldConfig)
-    action: ActionConfig = field(default_factory=ActionConfig)
+    board: BoardConfig = field(default_factory=BoardConfig)
+    camera: Camera = field(default_factory=Camera)
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self):
-        """Refuse a time limit, a kind of board or of sight that cannot be."""
+        """Refuse a kind of board or of sight that cannot be."""
+        super().__post_init__()
         check_boards(self.boards)
-        if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
-            raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
         if self.sight not in get_args(Sight):
             raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")

@@ -74,7 +74,7 @@ class Raster(_Script):
 
     def __init__(self, config: WipingConfig, num_envs: int):
         super().__init__(config, num_envs)
-        board = config.world.board
+        board = config.board
         half = board.ink_size / 2
         lanes = np.linspace(-half + 0.02, half - 0.02, 1 + int(np.ceil((2 * half - 0.04) / LANE_M)))
         ends = [(x, side * half) for k, x in enumerate(lanes) for side in ((-1, 1) if k % 2 == 0 else (1, -1))]
@@ -100,7 +100,7 @@ class NearestInk(_Script):
 
     def __init__(self, config: WipingConfig, num_envs: int, homography: np.ndarray):
         super().__init__(config, num_envs)
-        size = config.world.camera.size
+        size = config.camera.size
         self._ground = ground_of(homography, (size, size))
 
     def act(self, observation):

@@ -1,7 +1,7 @@
-"""The wiping task for Gymnasium: one environment, or many stepped in native threads."""
+"""Any task for Gymnasium: one environment, or many stepped in native threads."""
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -14,40 +14,39 @@ from gymnasium.vector.utils import batch_space
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
-from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
-from contactsafe.sim.world import POLICY_RATE_HZ
-from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.robot.arm import Arm
+from contactsafe.sim.snapshot import Part, of_array, of_generators, of_object, put, take
+from contactsafe.sim.worlds import POLICY_RATE_HZ
+from contactsafe.tasks.base.config import TaskConfig
+from contactsafe.tasks.base.registry import backend_of, tasks_type
+from contactsafe.tasks.base.tasks import Tasks
 
 _RENDER_MODES = ["rgb_array"]
 
 
-def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
-    size = config.world.camera.size
-    observation = gymnasium.spaces.Dict(
-        {
-            **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in OBSERVED.items()},
-            "mask": gymnasium.spaces.Box(0, 255, (size, size, 1), np.uint8),
-        }
-    )
-    return observation, gymnasium.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
-
-
-class _Wiping(Independent):
+class _Environment(Independent):
     """What the single and the vector environment have in common: tasks, their limits, and Gymnasium's order of calls.
 
     Copies, pickled or not, have worlds of their own and go on from where the original is.
     """
 
     metadata: dict[str, Any] = {"render_modes": _RENDER_MODES, "render_fps": POLICY_RATE_HZ}
-    task_type: type[WipingTasks] = WipingTasks
     _spec: EnvSpec | None = None
     _was_reset = _is_closed = False
+    tasks: Tasks
 
-    def _begin(
-        self, config: WipingConfig | None, num_envs: int, render_mode: str | None, max_episode_steps: int | None
-    ) -> None:
+    def _make(
+        self,
+        task: str | type[Tasks],
+        num_envs: int,
+        config: TaskConfig | None,
+        engine: str,
+        arm: Arm | None,
+        render_mode: str | None,
+        max_episode_steps: int | None,
+    ) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
+        """Make the tasks; return the spaces of one."""
         if render_mode is not None and render_mode not in _RENDER_MODES:
             raise InvalidInputError(f"render_mode = {render_mode!r}; choose {' or '.join(_RENDER_MODES)}, or None")
         if max_episode_steps is not None and max_episode_steps < 1:
@@ -55,9 +54,17 @@ class _Wiping(Independent):
                 f"max_episode_steps = {max_episode_steps}; give 1 or more, or None for the config's"
             )
         self.render_mode = render_mode
-        self.tasks = self.task_type(config, num_envs)
+        kind = tasks_type(task) if isinstance(task, str) else task
+        self.tasks = kind(config, num_envs, arm=arm, backend=backend_of(engine))
         if max_episode_steps is not None:
             self.tasks.step_limit = int(max_episode_steps)
+        record = self.tasks.tasks
+        vectors = {
+            name: gymnasium.spaces.Box(-np.inf, np.inf, record[name].shape[1:], np.float32)
+            for name in self.tasks.observed
+        }
+        observation = gymnasium.spaces.Dict({**vectors, **self.tasks.own_spaces()})
+        return observation, gymnasium.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -71,9 +78,9 @@ class _Wiping(Independent):
             self._spec.max_episode_steps = self.tasks.step_limit
 
     @property
-    def camera_homography(self) -> np.ndarray:
-        """Board-plane coordinates (x, y, 1), m, to mask pixels (u, v, w), (3, 3)."""
-        return self.tasks.worlds.homography
+    def camera_homography(self) -> np.ndarray | None:
+        """Plane coordinates (x, y, 1), m, to pixels (u, v, w) of the task's camera, (3, 3); None without one."""
+        return getattr(self.tasks, "camera_homography", None)
 
     def _check_order(self, doing: str) -> None:
         if self._is_closed:
@@ -81,24 +88,25 @@ class _Wiping(Independent):
         if doing != "reset" and not self._was_reset:
             raise ResetNeeded(f"`{doing}` was called before `reset`; call `reset` first")
 
+    def _options(self, options: Mapping[str, Any] | None, *others: str) -> dict[str, Any]:
+        """Return the options of a reset that the task takes; refuse what is not known."""
+        known = (*self.tasks.options, *others)
+        unknown = [str(name) for name in options or {} if name not in known]
+        if unknown:
+            raise InvalidInputError(
+                f"reset options hold {', '.join(unknown)}; known are {', '.join(known) or 'none'}; leave others out"
+            )
+        return {name: value for name, value in (options or {}).items() if name in self.tasks.options}
+
     def _picture(self, i: int) -> np.ndarray:
-        """Give mask i as an image, uint8 (512, 512, 3)."""
-        return np.kron(self.tasks.worlds.masks[i], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
-
-
-def _drawing_of(options: dict[str, Any] | None, *others: str) -> Any:
-    """Give the drawing among the options of a reset, None where there is none; refuse what is not known."""
-    options = options or {}
-    unknown = [str(name) for name in options if name not in ("drawing", *others)]
-    if unknown:
-        raise InvalidInputError(
-            f"reset options hold {', '.join(unknown)}; known are {', '.join(('drawing', *others))}; leave others out"
-        )
-    return options.get("drawing")
+        picture = getattr(self.tasks, "picture", None)
+        if picture is None:
+            raise InvalidInputError(f"task '{self.tasks.name}' has no picture; make it with render_mode=None")
+        return picture(i)
 
 
 def _seed_of(seed: Any) -> int | None:
-    """Give a seed as Gymnasium's generators want it, NumPy's whole numbers too.
+    """Return a seed as Gymnasium's generators want it, NumPy's whole numbers too.
 
     Raises:
         InvalidInputError: it is no whole number, or negative.
@@ -110,54 +118,55 @@ def _seed_of(seed: Any) -> int | None:
     return int(seed)
 
 
-class WipingEnv(_Wiping, gymnasium.Env):
-    """Wipe the ink off a whiteboard: `contactsafe/Wiping-v0`.
+class TaskEnv(_Environment, gymnasium.Env):
+    """One task: `gymnasium.make("contactsafe/Wiping-v0")`, and so on for every task.
 
-    Observation: `pose`, tool position (m, world) and rotation vector from straight down (rad), (6,); `target`, x_d less
-    that pose (m, rad), K1 (1/s²) and D1 (1/s) as now in force, (18,); `force` of the board on the tool as the wrist
-    measures it, smoothed, world axes (N), (3,); `mask`, the segmented camera image, ink 0 and everything else 255,
-    (128, 128, 1).
-    Action: increments of x_d (6), K1 (6) and D1 (6), in [−1, 1], 60 Hz over 1 kHz ticks.
-    `reset(options={"drawing": image})` puts a drawing of the user's own on the board.
+    Observation: what the task declares. Action: increments of x_d (6), K1 (6) and D1 (6), in [−1, 1], at 60 Hz over
+    1 kHz ticks.
 
     Args:
+        task: name of the task, or its class.
         config: of the task.
-        render_mode: 'rgb_array' gives the mask enlarged, or None.
+        engine: 'mujoco' or 'pybullet'.
+        arm: that works; None for the task's own.
+        render_mode: 'rgb_array' renders the task's picture, or None.
         max_episode_steps: in place of `config.episode_s`; `gymnasium.make` takes this for the shorter of the two.
     """
 
     def __init__(
         self,
-        config: WipingConfig | None = None,
+        task: str | type[Tasks] = "wiping",
+        config: TaskConfig | None = None,
+        engine: str = "mujoco",
+        arm: Arm | None = None,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
     ):
-        self._begin(config, 1, render_mode, max_episode_steps)
-        self.observation_space, self.action_space = _spaces(self.tasks.config)
+        made = self._make(task, 1, config, engine, arm, render_mode, max_episode_steps)
+        self.observation_space, self.action_space = made
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Begin an episode with a new board; see `gymnasium.Env.reset`."""
+        """Begin an episode; see `gymnasium.Env.reset`."""
         self._check_order("reset")
-        drawing, seed = _drawing_of(options), _seed_of(seed)
+        chosen, seed = self._options(options), _seed_of(seed)
         super().reset(seed=seed)
         if seed is not None:
             self.tasks.worlds.seed(seed)
-        self.tasks.reset(0, self.np_random, drawing=drawing)
+        self.tasks.reset(0, self.np_random, **chosen)
         self._was_reset = True
-        return self.tasks.observation(0), {"ink_left": 1.0}
+        return self.tasks.observation(0), dict(self.tasks.start_info)
 
     def step(self, action):
         """Run 1/60 s; see `gymnasium.Env.step`."""
         self._check_order("step")
-        self.tasks.step(np.asarray(action)[None])
-        info = {name: value[0] for name, value in self.tasks.info().items()}
         tasks = self.tasks
-        return (
-            tasks.observation(0), float(tasks.reward[0]), bool(tasks.terminated[0]), bool(tasks.truncated[0]), info,
-        )  # fmt: skip
+        tasks.step(np.asarray(action)[None])
+        info = {name: value[0] for name, value in tasks.info().items()}
+        ends = bool(tasks.terminated[0]), bool(tasks.truncated[0])
+        return tasks.observation(0), float(tasks.reward[0]), *ends, info
 
     def render(self):
-        """Give the mask as an image, uint8 (512, 512, 3)."""
+        """Return the task's picture, uint8 (height, width, 3)."""
         if self.render_mode is None:
             return None
         self._check_order("render")
@@ -169,65 +178,76 @@ class WipingEnv(_Wiping, gymnasium.Env):
         self._is_closed = True
 
 
-class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
-    """N wiping tasks stepped in native threads: `gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=N)`.
+class TaskVectorEnv(_Environment, gymnasium.vector.VectorEnv):
+    """N tasks stepped in native threads: `gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=N)`.
 
-    Same spaces and infos as `WipingEnv`, batched; an episode that ends is reset in the same step, its last
-    observation and info under `final_obs` and `final_info`. `reset(options={"reset_mask": mask})` begins new episodes
-    where the mask, bool (N,), is true, and leaves the others as they are.
+    Same spaces and infos as `TaskEnv`, batched. `reset(options={"reset_mask": mask})` begins new episodes where the
+    mask, bool (N,), is true, and leaves the others as they are. What becomes of an episode that ends is Gymnasium's
+    autoreset mode: SAME_STEP resets it in the same step, its last observation and info under `final_obs` and
+    `final_info`; NEXT_STEP in the next one, whose action it ignores; DISABLED leaves it to the caller.
 
     Args:
         num_envs: N.
-        config: of the task.
-        render_mode: 'rgb_array' gives the masks enlarged, or None.
-        max_episode_steps: in place of `config.episode_s`.
+        task, config, engine, arm, render_mode, max_episode_steps: as for `TaskEnv`.
+        autoreset_mode: one of Gymnasium's three.
     """
-
-    autoreset_mode = AutoresetMode.SAME_STEP
-    metadata = {**_Wiping.metadata, "autoreset_mode": autoreset_mode}
 
     def __init__(
         self,
         num_envs: int = 1,
-        config: WipingConfig | None = None,
+        task: str | type[Tasks] = "wiping",
+        config: TaskConfig | None = None,
+        engine: str = "mujoco",
+        arm: Arm | None = None,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ):
         if not isinstance(num_envs, int | np.integer) or num_envs < 1:
             raise InvalidInputError(f"num_envs = {num_envs!r}; give a whole number from 1 on")
         self.num_envs = int(num_envs)
-        self._begin(config, self.num_envs, render_mode, max_episode_steps)
-        self.single_observation_space, self.single_action_space = _spaces(self.tasks.config)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {**_Environment.metadata, "autoreset_mode": self.autoreset_mode}
+        made = self._make(task, self.num_envs, config, engine, arm, render_mode, max_episode_steps)
+        self.single_observation_space, self.single_action_space = made
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._rngs: list[np.random.Generator] = []
+        self._ended = np.zeros(self.num_envs, bool)
 
-    def reset(self, *, seed=None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None):
         """Begin an episode in every task, or in those of `options["reset_mask"]`.
 
         Args:
             seed: a number seeds environment i with seed + i; a sequence gives one each, None for a random one; None
                 goes on with the generators in use.
-            options: `drawing` for all boards; `reset_mask`, bool (N,).
+            options: those of the task, for all; `reset_mask`, bool (N,).
 
         Returns:
             Observations of all tasks, and infos.
         """
         self._check_order("reset")
-        drawing = _drawing_of(options, "reset_mask")
+        of_task = self._options(options, "reset_mask")
         chosen = self._chosen(options or {})
         if seed is not None or not self._rngs:
             self._seed(seed, chosen)
         for i in chosen:
-            self.tasks.reset(i, self._rngs[i], drawing=drawing)
+            self.tasks.reset(i, self._rngs[i], **of_task)
         self._was_reset = True
         begun = np.zeros(self.num_envs, bool)
         begun[chosen] = True
-        ink_left = np.where(begun, 1.0, self.tasks.info()["ink_left"])
-        return self.tasks.observation(), {"ink_left": ink_left, "_ink_left": begun}
+        self._ended[begun] = False
+        return self.tasks.observation(), self._start_info(begun)
+
+    def _start_info(self, begun: np.ndarray) -> dict[str, np.ndarray]:
+        """Return what is said of episodes that begin, where `begun`, bool (N,)."""
+        now, info = self.tasks.info(), {}
+        for name, value in self.tasks.start_info.items():
+            info[name], info[f"_{name}"] = np.where(begun, value, now[name]), begun.copy()
+        return info
 
     def _chosen(self, options: Mapping[str, Any]) -> list[int]:
-        """Give the numbers of the tasks to reset."""
+        """Return the numbers of the tasks to reset."""
         if options.get("reset_mask") is None:
             return list(range(self.num_envs))
         mask = np.asarray(options["reset_mask"])
@@ -260,15 +280,30 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
     def step(self, actions):
         """Run 1/60 s in every task; see `gymnasium.vector.VectorEnv.step`."""
         self._check_order("step")
-        tasks = self.tasks
+        tasks, before = self.tasks, self._ended.copy()
+        if before.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(
+                f"`step` was called while episode {int(np.argmax(before))} is over; call `reset` with a reset_mask"
+            )
         tasks.step(actions)
         reward, terminated, truncated = tasks.reward, tasks.terminated, tasks.truncated
         info: dict[str, Any] = tasks.info()
-        ended = terminated | truncated
-        if ended.any():
-            info = self._restart(ended, info)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            ended = terminated | truncated
+            info = self._restart(ended, info) if ended.any() else info
+        elif before.any():  # their step did not count: it is their reset
+            self._begin_anew(before, info)
+            reward[before], terminated[before], truncated[before] = 0.0, False, False
+        if self.autoreset_mode != AutoresetMode.SAME_STEP:
+            self._ended = terminated | truncated
         info |= {f"_{name}": np.ones(self.num_envs, bool) for name in list(info) if not name.startswith(("_", "final"))}
         return tasks.observation(), reward, terminated, truncated, info
+
+    def _begin_anew(self, ended: np.ndarray, info: dict[str, Any]) -> None:
+        for i in np.flatnonzero(ended):
+            self.tasks.reset(int(i), self._rngs[i])
+        for name, value in self.tasks.start_info.items():
+            info[name] = np.where(ended, value, info[name])
 
     def _restart(self, ended: np.ndarray, info: dict[str, Any]) -> dict[str, Any]:
         """Reset ended tasks, keeping their last observation and info."""
@@ -277,15 +312,18 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         final_info |= {f"_{name}": ended.copy() for name in info}
         for i in np.flatnonzero(ended):
             final_obs[i] = self.tasks.observation(i)
-            self.tasks.reset(int(i), self._rngs[i])
-        info["ink_left"] = np.where(ended, 1.0, info["ink_left"])
+        self._begin_anew(ended, info)
         return info | {
             "final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended.copy(),
         }  # fmt: skip
 
     def parts(self) -> dict[str, Part]:
         """List what decides the environment's future."""
-        return {"tasks": of_object(self.tasks), "episodes": of_generators(self._rngs)}
+        return {
+            "tasks": of_object(self.tasks),
+            "episodes": of_generators(self._rngs),
+            "ended": of_array(self._ended, 0, 1),
+        }
 
     def snapshot(self) -> dict[str, Any]:
         """Take all that decides the environment's future, as plain values and arrays."""
@@ -301,7 +339,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         self._was_reset = bool(self._rngs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Give the masks as images, uint8 (512, 512, 3) each."""
+        """Return the tasks' pictures, uint8 (height, width, 3) each."""
         if self.render_mode is None:
             return None
         self._check_order("render")
@@ -311,3 +349,15 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         """Stop the native threads."""
         self.tasks.worlds.close()
         self._is_closed = True
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode[mode.upper()] if isinstance(mode, str) else AutoresetMode(mode)
+    except (KeyError, ValueError):
+        names = ", ".join(one.name for one in AutoresetMode)
+        raise InvalidInputError(f"autoreset_mode = {mode!r}; choose one of {names}") from None
+
+
+Make = Callable[[int], TaskVectorEnv]
+"""Makes a vector environment of so many tasks."""

@@ -5,8 +5,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.handwriting import FONTS, WORDS, write_digits, write_words
-from contactsafe.sim.whiteboard import Whiteboard
+from contactsafe.tasks.wiping.handwriting import FONTS, WORDS, write_digits, write_words
+from contactsafe.tasks.wiping.whiteboard import Whiteboard
 
 Boards = Literal["strokes", "digits", "text", "handwriting"]
 BOARDS: tuple[str, ...] = get_args(Boards)

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactsafe.core.byte_scan import places_unlike
 from contactsafe.core.compiled import compiled
-from contactsafe.sim.whiteboard import CLEAN, INK
+from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
 
 
 class InkIndex(NamedTuple):

@@ -11,9 +11,9 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.robot.mjcf import ARM_CONTYPE
-from contactsafe.sim.camera import camera_axes, plane_homography
-from contactsafe.sim.config import BoardConfig, Camera
-from contactsafe.sim.whiteboard import INK
+from contactsafe.tasks.wiping.board import BoardConfig, Camera
+from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
+from contactsafe.tasks.wiping.whiteboard import INK
 from contactsafe.vision.opencv import cv2
 from contactsafe.vision.silhouette import Solids, cast, fill, on_plane, project, rims, silhouette
 

@@ -15,9 +15,9 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.native import view2
 from contactsafe.robot.mjcf import ARM_CONTYPE
-from contactsafe.sim.config import Camera
-from contactsafe.sim.ink import count_shown, list_cells
-from contactsafe.sim.whiteboard import Whiteboard
+from contactsafe.tasks.wiping.board import Camera
+from contactsafe.tasks.wiping.ink import count_shown, list_cells
+from contactsafe.tasks.wiping.whiteboard import Whiteboard
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
@@ -161,7 +161,7 @@ def render_mask(camera, cells, plant, out):
     Args:
         camera: `CameraTables`.
         cells: the board's, uint8, (rows, columns).
-        plant: `plant_dtype` record, for where the arm's shapes are.
+        plant: `mujoco_dtype` record, for where the arm's shapes are.
         out: uint8, (size, size); overwritten.
     """
     listed = np.empty((cells.size, 2), dtype=np.int16)
@@ -177,7 +177,7 @@ def render_mask_into(camera, shown, plant, out):
     Args:
         camera: `CameraTables`.
         shown: in how many cells that are not clean each pixel has a part, uint16 (size, size).
-        plant: `plant_dtype` record, for where the arm's shapes are.
+        plant: `mujoco_dtype` record, for where the arm's shapes are.
         out: uint8, (size, size); overwritten.
     """
     out[:] = OTHER_PIXEL

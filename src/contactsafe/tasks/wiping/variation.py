@@ -10,11 +10,13 @@ import numpy as np
 from contactsafe.core.byte_scan import copy_picture, places_unlike
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
-from contactsafe.sim.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
-from contactsafe.sim.config import Camera
-from contactsafe.sim.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
+from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim.snapshot import Part, check, of_array, put, take
-from contactsafe.sim.world import Worlds
+from contactsafe.sim.worlds import Worlds
+from contactsafe.tasks.wiping.board import Camera
+from contactsafe.tasks.wiping.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
+from contactsafe.tasks.wiping.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
+from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 CAMERAS = 16
 """Cameras that stand ready: tables of one take 10 ms to compute, so episodes choose among them."""
@@ -27,21 +29,22 @@ class Variation(Independent):
 
     Args:
         worlds: each with a model of its own.
+        boards: in them.
         ranges: that every episode draws from.
 
     Attributes:
         drawn: `draw_dtype` records of the episodes that run, (n,).
     """
 
-    def __init__(self, worlds: Worlds, ranges: Randomisation):
-        self._worlds, self._ranges = worlds, ranges
+    def __init__(self, worlds: Worlds, boards: Whiteboards, ranges: Randomisation):
+        self._worlds, self._boards, self._ranges = worlds, boards, ranges
         self.drawn = np.zeros(worlds.n, dtype=draw_dtype)
-        self._plants = [_Plant(worlds, i) for i in range(worlds.n)]
+        self._plants = [_Plant(worlds, boards, i) for i in range(worlds.n)]
         # Their places are the same in every run: a run that goes on must find them again.
         rng = np.random.default_rng(0)
-        cameras = [_perturbed(worlds.config.camera, ranges, rng) for _ in range(CAMERAS)]
-        worlds.cameras = stack_cameras([camera_tables(c, worlds.boards[0], worlds.models[0]) for c in cameras])
-        self._frames = np.full((worlds.n, MAX_DELAY_STEPS + 1, *worlds.masks.shape[1:]), OTHER_PIXEL, dtype=np.uint8)
+        cameras = [_perturbed(boards.camera_config, ranges, rng) for _ in range(CAMERAS)]
+        boards.cameras = stack_cameras([camera_tables(c, boards.boards[0], worlds.models[0]) for c in cameras])
+        self._frames = np.full((worlds.n, MAX_DELAY_STEPS + 1, *boards.masks.shape[1:]), OTHER_PIXEL, dtype=np.uint8)
         self._newest = np.zeros(worlds.n, dtype=np.int64)
         self._random = np.ones(worlds.n, dtype=np.uint64)
 
@@ -53,12 +56,12 @@ class Variation(Independent):
 
     def look(self, start: int, stop: int) -> None:
         """Take the masks of worlds start to stop as they are, and put what the policy sees of them in their place."""
-        _look(start, stop, self.drawn, self._worlds.masks, self._frames, self._newest, self._random)
+        _look(start, stop, self.drawn, self._boards.masks, self._frames, self._newest, self._random)
 
     def look_first(self, i: int) -> None:
         """The same, as if what is seen had been there for long."""
-        _corrupt(self._worlds.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
-        self._frames[i] = self._worlds.masks[i]
+        _corrupt(self._boards.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
+        self._frames[i] = self._boards.masks[i]
 
     def parts(self) -> dict[str, Part]:
         """List what decides the future."""
@@ -97,8 +100,8 @@ class Variation(Independent):
         check(parts, value)
 
     def _apply(self, i: int) -> None:
-        self._worlds.plants[i]["camera"] = self.drawn[i]["camera"]
-        self._worlds.boards[i].changed = True  # as another camera sees it
+        self._boards.records[i]["camera"] = self.drawn[i]["camera"]
+        self._boards.boards[i].changed = True  # as another camera sees it
         self._plants[i].apply(self.drawn[i])
 
 
@@ -114,18 +117,22 @@ def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) 
 class _Plant:
     """One world's plant as it was built, from which every draw starts."""
 
-    def __init__(self, worlds: Worlds, i: int):
-        self._worlds, self._i = worlds, i  # not the record itself, which a copy of this would share with nobody
-        model, record = worlds.models[i], worlds.plants[i]
-        self._friction, self._pad_half = record["friction"].copy(), record["pad_half"].copy()
-        self._delay = int(record["delay_ticks"])
-        self._board, self._tool, self._pad = model.body("board").id, model.body("tool").id, model.geom("pad").id
+    def __init__(self, worlds: Worlds, boards: Whiteboards, i: int):
+        self._worlds, self._boards, self._i = (
+            worlds,
+            boards,
+            i,
+        )  # not the record itself, which a copy of this would share with nobody
+        model, errors = worlds.models[i], worlds.records[i]["errors"]
+        self._friction, self._pad_half = errors["friction"].copy(), boards.records[i]["pad_half"].copy()
+        self._delay = int(errors["delay_ticks"])
+        self._board, self._tool, self._pad = model.body("workbench").id, model.body("tool").id, model.geom(TIP_GEOM).id
         self._links = [k for k in range(model.nbody) if model.body(k).name.startswith("link")]
         self._kept = {name: getattr(model, name).copy() for name in _CHANGED}
 
     def apply(self, drawn) -> None:
         """Make model and record those that were drawn."""
-        model, plant = self._worlds.models[self._i], self._worlds.plants[self._i]
+        model, errors = self._worlds.models[self._i], self._worlds.records[self._i]["errors"]
         for name, value in self._kept.items():
             getattr(model, name)[:] = value
         model.body_pos[self._board, 2] += drawn["board_height_m"]
@@ -135,10 +142,10 @@ class _Plant:
         model.body_mass[self._links] *= drawn["inertia"]
         model.body_inertia[self._links] *= drawn["inertia"]
         model.body_mass[self._tool] += drawn["payload_kg"]
-        plant["friction"] = self._friction
-        plant["friction"][:, 0] *= drawn["joint_friction"]
-        plant["pad_half"] = self._pad_half * drawn["pad_size"]
-        plant["delay_ticks"] = max(self._delay, drawn["torque_delay_ticks"])
+        errors["friction"] = self._friction
+        errors["friction"][:, 0] *= drawn["joint_friction"]
+        self._boards.records[self._i]["pad_half"] = self._pad_half * drawn["pad_size"]
+        errors["delay_ticks"] = max(self._delay, drawn["torque_delay_ticks"])
 
 
 @compiled(nogil=True)

@@ -1,7 +1,7 @@
-"""Simulated worlds: an arm under its controller before a whiteboard, one or many, stepped natively."""
+"""Simulated worlds: arms under their controllers, one or many, in any backend; MuJoCo steps natively in threads."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -14,22 +14,17 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.camera import camera_tables, plane_homography, render_mask, stack_cameras
+from contactsafe.robot.mjcf import TIP_GEOM
+from contactsafe.sim import mujoco_backend
+from contactsafe.sim.backend import Backend, run_backend
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.ink import empty_ink_index, enter
-from contactsafe.sim.records import (
-    fill_plant,
-    noise_channels,
-    plant_bounds,
-    plant_dtype,
-    point_plant,
-    step_metrics_dtype,
-    trace_dtype,
-)
+from contactsafe.sim.mujoco_record import fill_plant, point_plant
+from contactsafe.sim.record import world_bounds, world_dtype
 from contactsafe.sim.scene import build_plant
-from contactsafe.sim.snapshot import Part, of_array, of_generators, of_physics, of_records, put, take
+from contactsafe.sim.sensing import fill_errors, noise_channels
+from contactsafe.sim.snapshot import Part, of_generators, of_physics, of_records, put, take
 from contactsafe.sim.stepping import run_ticks
-from contactsafe.sim.whiteboard import CLEAN, INK, OBJECT, Whiteboard
+from contactsafe.sim.truth import sample_dtype, step_metrics_dtype, trace_dtype
 
 POLICY_RATE_HZ = 60
 """Rate of the policy; 1 kHz does not divide by it, so its steps last 17, 17 and 16 ticks in turn."""
@@ -41,15 +36,25 @@ MAX_TICKS = 17
 
 
 def ticks_of_step(step: int) -> int:
-    """Give the number of 1 kHz ticks of the policy step with this number, 17, 17, 16 in turn."""
+    """Return the number of 1 kHz ticks of the policy step with this number, 17, 17, 16 in turn."""
     return 16 if step % 3 == 2 else 17
 
 
 @compiled(nogil=True)
-def run_worlds(start, stop, plants, controllers, cells, noise, ticks, reports, traces):
+def run_worlds(start, stop, worlds, controllers, noise, ticks, metrics, samples, traces):
     """Run ticks[i] ticks of each world from start to stop; see `run_ticks`."""
     for i in range(start, stop):
-        run_ticks(plants[i], controllers[i], cells[i], noise[i], ticks[i], reports[i], traces[i])
+        run_ticks(worlds[i], controllers[i], noise[i], ticks[i], metrics[i], samples[i], traces[i])
+
+
+@compiled(nogil=True)
+def _read_one(worlds, i):
+    mujoco_backend.read(worlds[i])
+
+
+@compiled(nogil=True)
+def _mirror_one(worlds, i):
+    mujoco_backend.mirror(worlds[i])
 
 
 def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list[WorldConfig]:
@@ -58,21 +63,21 @@ def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list
     configs = list(world)
     if len(configs) != n:
         raise InvalidInputError(f"{len(configs)} world configurations for {n} worlds; give one, or one each")
-    if any(c.board != configs[0].board or c.camera != configs[0].camera for c in configs):
-        raise InvalidInputError("worlds that step together must have the same board and camera; step the others apart")
     return configs
 
 
-def _plants(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.MjModel]:
-    """Compile a plant for each configuration, equal ones once, but for obstacles that travel: those move the model."""
-    if not shared:
-        return [build_plant(arm, c) for c in configs]
-    compiled: dict[WorldConfig, mujoco.MjModel] = {}
-    return [
-        build_plant(arm, c) if any(any(o.travel) for o in c.obstacles)
-        else compiled.setdefault(c, build_plant(arm, c)) if c not in compiled else compiled[c]
-        for c in configs
-    ]  # fmt: skip
+def _models(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.MjModel]:
+    """Compile a model for each configuration, equal ones once, but for obstacles that travel: those move the model."""
+    known: dict[WorldConfig, mujoco.MjModel] = {}
+    models = []
+    for config in configs:
+        own = not shared or any(any(obstacle.travel) for obstacle in config.obstacles)
+        if own or config not in known:
+            models.append(build_plant(arm, config))
+            known.setdefault(config, models[-1])
+        else:
+            models.append(known[config])
+    return models
 
 
 def _check_tick(controller: ControllerConfig | None) -> None:
@@ -81,29 +86,25 @@ def _check_tick(controller: ControllerConfig | None) -> None:
 
 
 class Worlds(Independent):
-    """N independent worlds, stepped in native threads.
+    """N independent worlds.
 
     A copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
         arm: built from a description, with a tool.
-        world: plant, sensors, board, camera, obstacles; one for all, or one for each (same board and camera).
+        world: plant, sensors, fixtures, obstacles; one for all, or one for each.
         controller: a preset or another configuration, the same for all.
         n: how many.
         seed: of the sensors' noise and bias; world i draws from its own stream. One for all, or one for each: then
             what a world does depends on nothing but its own.
         shared: whether worlds alike share a model; false where each is changed from episode to episode.
+        backend: what computes the physics in place of MuJoCo: `backend(arm, config, tick_s)` makes one for each world.
+            It steps in Python, one world after the other.
 
     Attributes:
-        plants, controllers, reports: arrays of `plant_dtype`, `controller_dtype`, `step_metrics_dtype` records, (n,).
-        cells: the boards, uint8, (n, rows, columns).
-        boards: `Whiteboard` objects whose cells lie in `cells`.
-        masks: what the cameras saw when `render` was last called, uint8, (n, size, size).
-        camera: `CameraTables` as calibrated.
-        cameras: those that look, side by side; `plants["camera"]` says which one at which world.
-        ink_index: `InkIndex` of the boards and the cameras that look at them; `enter_changed` brings it up to date
-            with what was drawn, tasks with what was wiped.
-        homography: of board plane to mask pixels, (3, 3).
+        records, controllers, metrics: arrays of `world_dtype`, `controller_dtype`, `step_metrics_dtype` records, (n,).
+        samples: `sample_dtype` records of the last step's ticks, (n, MAX_TICKS).
+        models, datas: MuJoCo's, the geometry of the worlds in every backend.
         no_trace: an empty trace, for `run_worlds` and its like.
     """
 
@@ -117,38 +118,31 @@ class Worlds(Independent):
         n: int = 1,
         seed: int | Sequence[int] | None = None,
         shared: bool = True,
+        backend: Callable[[Arm, WorldConfig, float], Backend] | None = None,
     ):
         self.arm, self.n = arm, n
         self.configs = _one_each(world, n)
         _check_tick(controller)
-        self.config = self.configs[0]
-        self.models = _plants(arm, self.configs, shared)
-        self.boards = [Whiteboard(self.config.board) for _ in range(n)]
-        self.cells = np.zeros((n, *self.boards[0].cells.shape), dtype=np.uint8)
-        self.plants = np.zeros(n, dtype=plant_dtype(arm.n))
+        self.models = _models(arm, self.configs, shared)
+        self.records = np.zeros(n, dtype=world_dtype(arm.n))
         self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
-        self.reports = np.zeros(n, dtype=step_metrics_dtype)
+        self.metrics = np.zeros(n, dtype=step_metrics_dtype)
+        self.samples = np.zeros((n, MAX_TICKS), dtype=sample_dtype)
         self._owners = [Controller(arm, controller, self.controllers, i) for i in range(n)]
         self._bind()
-        for i in range(n):
-            fill_plant(self.plants[i], self.models[i], arm, self.configs[i])
-            self.plants[i]["origin"] = self.boards[i].origin
-        size = self.config.camera.size
-        self.masks = np.full((n, size, size), 255, dtype=np.uint8)
-        self.camera = camera_tables(self.config.camera, self.boards[0], self.models[0])
-        self.cameras = stack_cameras([self.camera])
-        self.ink_index = empty_ink_index(n, self.boards[0].cells.size, size)
-        self.homography = plane_homography(self.config.camera, self.config.board.centre[2])
+        for record, model, config in zip(self.records, self.models, self.configs, strict=True):
+            fill_plant(record["plant"], model, config)
+            fill_errors(record["errors"], arm, config, TICK_S)
         self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
         self._threads = Threads(min(n, os.cpu_count() or 1))
+        self.backends = [backend(arm, config, TICK_S) for config in self.configs] if backend else []
         self.seed(seed)
 
     def _bind(self) -> None:
         self.datas = [mujoco.MjData(model) for model in self.models]
-        for i, board in enumerate(self.boards):
-            board.cells = self.cells[i]
-            point_plant(self.plants[i], self.models[i], self.datas[i])
+        for record, model, data in zip(self.records, self.models, self.datas, strict=True):
+            point_plant(record["plant"], model, data)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "physics": of_physics(self.models, self.datas).take()}
@@ -179,33 +173,27 @@ class Worlds(Independent):
         self.rngs = [np.random.Generator(np.random.SFC64(stream)) for stream in streams]
 
     def reset(self, i: int, q) -> None:
-        """Put world i's arm at rest at q (n,) rad, with a new sensor bias; the board stays as it is."""
+        """Put world i's arm at rest at q (n,) rad, with a new sensor bias."""
         q = self.arm.joint_vector(q, "q")
-        model, data, plant = self.models[i], self.datas[i], self.plants[i]
+        model, data, record = self.models[i], self.datas[i], self.records[i]
         mujoco.mj_resetData(model, data)
         model.qpos_spring[self.arm.n :] = model.qpos0[self.arm.n :]  # obstacles that travelled are back
         data.qpos[: self.arm.n] = q
-        dynamics = self.arm.dynamics(q, np.zeros(self.arm.n))
-        self._owners[i].reset(q, torque=np.clip(dynamics["g"], -self.arm.tau_max, self.arm.tau_max))
-        data.ctrl[:] = dynamics["g"]
+        gravity = self.arm.dynamics(q, np.zeros(self.arm.n))["g"]
+        self._owners[i].reset(q, torque=np.clip(gravity, -self.arm.tau_max, self.arm.tau_max))
+        data.ctrl[:] = gravity
         mujoco.mj_forward(model, data)
-        plant["tick"], plant["push_body"], plant["obstacle_stopped"] = 0, 0, 0
-        plant["q_seen"], plant["qd_seen"] = q, 0.0
-        plant["tau_delayed"] = dynamics["g"]
-        sensors = self.configs[i].sensors
-        plant["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
-        plant["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
-
-    def enter_ink(self, i: int) -> None:
-        """Take down what lies on board i and where its camera shows it: it was drawn on, or the camera changed."""
-        enter(self.ink_index, i, self.cells[i], self.cameras.pixels[self.plants[i]["camera"]])
-        self.boards[i].changed = False
-
-    def enter_changed(self) -> None:
-        """Do so for every board that says it has changed."""
-        for i, board in enumerate(self.boards):
-            if board.changed:
-                self.enter_ink(i)
+        record["tick"], record["push"]["body"], record["plant"]["obstacle_stopped"] = 0, 0, 0
+        errors, sensors = record["errors"], self.configs[i].sensors
+        errors["q_seen"], errors["qd_seen"], errors["tau_delayed"] = q, 0.0, gravity
+        errors["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
+        errors["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
+        if self.backends:
+            self.backends[i].reset(q)
+            self.backends[i].read(record)
+            _mirror_one(self.records, i)
+        else:
+            _read_one(self.records, i)
 
     def place(self, i: int, q) -> None:
         """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
@@ -214,14 +202,12 @@ class Worlds(Independent):
 
     def parts(self) -> dict[str, Part]:
         """List what decides the worlds' future, in the order in which it must be put back."""
-        changing = plant_bounds(min(model.nbody for model in self.models), len(self.cameras.pixels))
+        changing = world_bounds(min(model.nbody for model in self.models))
         return {
             "physics": of_physics(self.models, self.datas),
-            "plants": of_records(self.plants, changing, fixed=("",)),
+            "records": of_records(self.records, changing, fixed=("",)),
             "controllers": of_records(self.controllers, index_bounds(self.controllers[0]), fixed=("handle", "params")),
-            "reports": of_records(self.reports),
-            "cells": of_array(self.cells, CLEAN, OBJECT),
-            "masks": of_array(self.masks),
+            "metrics": of_records(self.metrics),
             "noise": of_generators(self.rngs),
         }
 
@@ -236,12 +222,12 @@ class Worlds(Independent):
             InvalidInputError: it is of other worlds, or of another version.
         """
         put(self.parts(), snapshot)
-        for i in range(self.n):
-            self.enter_ink(i)
 
     def close(self) -> None:
-        """Stop the threads."""
+        """Stop the threads, and end the backends."""
         self._threads.close()
+        for backend in self.backends:
+            backend.close()
 
     def sample_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Draw the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
@@ -251,8 +237,8 @@ class Worlds(Independent):
 
     def in_threads(self, run) -> None:
         """Call run(start, stop) over all worlds, one share a thread; errors surface here."""
-        if self.n == 1:
-            run(0, 1)
+        if self.n == 1 or self.backends:
+            run(0, self.n)
             return
         workers = self._threads.count
         bounds = np.linspace(0, self.n, workers + 1).astype(int)
@@ -270,15 +256,19 @@ class Worlds(Independent):
             InvalidInputError: too many ticks, none, or a trace too short for them.
         """
         ticks = self._checked(ticks, trace)
+        self.in_threads(lambda start, stop: self.run_some(start, stop, ticks, trace))
+
+    def run_some(self, start: int, stop: int, ticks: np.ndarray, trace: np.ndarray | None = None) -> None:
+        """Run the worlds from start to stop, in the calling thread; `ticks` (n,) and `trace` are sound."""
+        noise = self.sample_noise(start, stop)
         traces = self.no_trace if trace is None else trace
-
-        def share(start: int, stop: int) -> None:
-            noise = self.sample_noise(start, stop)
-            run_worlds(
-                start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces
-            )  # fmt: skip
-
-        self.in_threads(share)
+        records = (self.records, self.controllers, noise, ticks, self.metrics, self.samples, traces)
+        if not self.backends:
+            run_worlds(start, stop, *records)
+            return
+        for i in range(start, stop):
+            run_backend(self.backends[i], i, *records)
+            _mirror_one(self.records, i)
 
     def _checked(self, ticks, trace: np.ndarray | None) -> np.ndarray:
         """Give the ticks of each world, (n,), once they and the trace are sound."""
@@ -290,15 +280,25 @@ class Worlds(Independent):
             raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
         return ticks
 
-    def render(self) -> np.ndarray:
-        """Draw every camera's mask, uint8, (n, size, size)."""
-        for i in range(self.n):
-            render_mask(self.camera, self.cells[i], self.plants[i], self.masks[i])
-        return self.masks
+    def place_fixture(self, i: int, name: str, position, quat) -> None:
+        """Put a fixture of world i elsewhere; its worlds must not share their models. Reset the world next.
 
-    def ink_cells(self) -> np.ndarray:
-        """Count the cells that hold ink, (n,)."""
-        return np.count_nonzero(self.cells == INK, axis=(1, 2))
+        Args:
+            i: which world.
+            name: of the fixture.
+            position: of its frame, world, (3,), m.
+            quat: its orientation, w x y z, (4,).
+        """
+        body = self.models[i].body(name).id
+        self.models[i].body_pos[body], self.models[i].body_quat[body] = position, quat
+        if self.backends:
+            self.backends[i].place_fixture(name, np.asarray(position, float), np.asarray(quat, float))
+
+    def set_tip_friction(self, i: int, friction: float) -> None:
+        """Give the tip of world i's tool another Coulomb coefficient; reset the world next."""
+        self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
+        if self.backends:
+            self.backends[i].set_tip_friction(friction)
 
     def push(self, i: int, body: str, point, force, start_s: float, stop_s: float, ramp_s: float = 0.02) -> None:
         """Push a link of world i.
@@ -311,9 +311,8 @@ class Worlds(Independent):
             start_s, stop_s: since reset, s.
             ramp_s: time from nothing to full force, s.
         """
-        plant = self.plants[i]
-        plant["push_body"] = self.models[i].body(body).id
-        plant["push_point"], plant["push_force"] = point, force
-        dt = self.models[i].opt.timestep
-        plant["push_start"], plant["push_stop"] = round(start_s / dt), round(stop_s / dt)
-        plant["push_ramp"] = max(1, round(ramp_s / dt))
+        push = self.records[i]["push"]
+        push["body"] = self.models[i].body(body).id
+        push["point"], push["force"] = point, force
+        push["start"], push["stop"] = round(start_s / TICK_S), round(stop_s / TICK_S)
+        push["ramp"] = max(1, round(ramp_s / TICK_S))

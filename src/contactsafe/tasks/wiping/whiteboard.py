@@ -7,7 +7,7 @@ import numpy as np
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.config import BoardConfig
+from contactsafe.tasks.wiping.board import BoardConfig
 
 CLEAN, INK, OBJECT = 0, 1, 2
 """What a cell holds. An OBJECT is dark like ink in the camera's eyes, and no pad removes it."""

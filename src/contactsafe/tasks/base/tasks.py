@@ -1,0 +1,281 @@
+"""N tasks of a kind stepped together: what every task shares, and what each supplies."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from contactsafe.control import presets
+from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.action import act
+from contactsafe.policy.action_config import action_limits
+from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.posture import posture_rule
+from contactsafe.robot.soundness import array_of
+from contactsafe.sim.backend import Backend
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
+from contactsafe.sim.worlds import POLICY_RATE_HZ, Worlds, ticks_of_step
+from contactsafe.tasks.base.config import TaskConfig
+from contactsafe.tasks.base.pushes import Pusher
+from contactsafe.tasks.base.record import observe_one, task_dtype
+
+
+class Tasks(Independent):
+    """N tasks of a kind, stepped together; a task is a subclass, see docs/howto/own_task.md.
+
+    The first ones of a kind in a process compile what a step needs, or load it, which is said when it takes long. A
+    copy, pickled or not, has worlds of its own and goes on from where these are.
+
+    Args:
+        config: of the task; None for its defaults.
+        n: how many.
+        seed: of the sensors' noise; what an episode draws comes from the generator given to `reset`.
+        worlds: one configuration for each task in place of `config.world`, such as obstacles of its own.
+        arm: that works; None for the task's own.
+        backend: what computes the physics in place of MuJoCo; see `contactsafe.sim.backend`.
+
+    Attributes:
+        config: of the task.
+        arm: that works.
+        worlds: the simulation below.
+        tasks: array of `task_dtype` records, (n,).
+        step_limit: policy steps of an episode.
+    """
+
+    name: ClassVar[str]
+    """What the task is called, as in `--task NAME`."""
+
+    config_type: ClassVar[type[TaskConfig]] = TaskConfig
+    reward_terms: ClassVar[tuple[str, ...]] = ()
+    """Names of the reward's terms; each is reported in `info` as `reward_<name>`."""
+
+    own_fields: ClassVar[tuple[tuple[Any, ...], ...]] = ()
+    """Fields of the task's records beyond those of `task_dtype`."""
+
+    own_bounds: ClassVar[dict[str, tuple[float, float]]] = {}
+    """What fields that index something may be, both ends included."""
+
+    observed: ClassVar[tuple[str, ...]] = tuple(OBSERVED)
+    """Fields of the records that policies observe."""
+
+    options: ClassVar[tuple[str, ...]] = ()
+    """Names of the options that `reset` takes."""
+
+    start_info: ClassVar[dict[str, float]] = {}
+    """What `info` says of an episode that begins."""
+
+    def __init__(
+        self,
+        config: TaskConfig | None = None,
+        n: int = 1,
+        seed: int | Sequence[int] | None = None,
+        worlds: Sequence[WorldConfig] | None = None,
+        arm: Arm | None = None,
+        backend: Callable[..., Backend] | None = None,
+    ):
+        self.config = self._checked(config)
+        self.arm = arm or self.default_arm()
+        self._backend = backend
+        controller = presets.by_name(self.config.controller)
+        furnished = [self.furnish(world) for world in worlds or [self.config.world] * n]
+        self.worlds = Worlds(self.arm, furnished, controller, n, seed, shared=not self.varies, backend=backend)
+        self.tasks = np.zeros(n, dtype=task_dtype(self.reward_terms, self.own_fields))
+        self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
+        self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
+        self._limits = action_limits(self.config.action, self.centre)
+        self._actions = np.zeros((n, ACTION_SIZE))
+        self._ik = InverseKinematics(self.arm)
+        self._rule = posture_rule(self.arm)
+        self.prepare()
+        _warm_up(self)
+
+    # What a task supplies.
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """Point that the bounds of x_d are about, world, m."""
+        raise NotImplementedError
+
+    @property
+    def varies(self) -> bool:
+        """Whether episodes change the worlds' models."""
+        return False
+
+    def default_arm(self) -> Arm:
+        """Return the arm that works where none is given."""
+        return robots.panda()
+
+    def furnish(self, world: WorldConfig) -> WorldConfig:
+        """Return a world with what the task needs in it."""
+        return world
+
+    def prepare(self) -> None:
+        """Make what the task needs beyond worlds and records."""
+
+    def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
+        """Draw the episode of task i, change its world, and return where its tool starts."""
+        raise NotImplementedError
+
+    def begun(self, i: int, rng: np.random.Generator) -> None:
+        """Fill the own fields of task i's record; its world has been reset."""
+
+    def finish(self, start: int, stop: int) -> None:
+        """Score and observe the step that tasks start to stop have run; compiled, without the GIL."""
+        raise NotImplementedError
+
+    def own_parts(self) -> dict[str, Part]:
+        """List what decides the task's future beyond worlds, records and pushes; put back before them."""
+        return {}
+
+    def own_info(self) -> dict[str, np.ndarray]:
+        """Return figures of the last step by name, arrays (n,)."""
+        return {}
+
+    def own_observation(self, i: Any) -> dict[str, np.ndarray]:
+        """Return what policies observe beside vectors, such as pictures, of tasks i."""
+        return {}
+
+    def own_spaces(self) -> dict[str, gymnasium.Space]:
+        """Return their spaces."""
+        return {}
+
+    # What every task has.
+
+    def reset(self, i: int, rng: np.random.Generator, **options: Any) -> None:
+        """Begin an episode in task i.
+
+        Args:
+            i: which task.
+            rng: draws the episode.
+            options: some of the task's `options`.
+        """
+        self.worlds.reset(i, self.posture_over(self.begin(i, rng, options)))
+        if self._pusher is not None:
+            self._pusher.begin(i, rng)
+        controller = self.worlds.controllers[i]
+        target = controller["target"]
+        target["K_task"] = self.config.action.stiffness_start
+        target["D_task"] = 2.0 * np.sqrt(target["K_task"])
+        controller["output"]["position"] = controller["dynamics"]["position"]
+        controller["output"]["rotation"] = controller["dynamics"]["rotation"]
+        task = self.tasks[i]
+        task["steps"], task["success"], task["failed"] = 0, 0, 0
+        observe_one(self.worlds.controllers, self.tasks, i)
+        self.begun(i, rng)
+
+    def posture_over(self, pose: Pose) -> np.ndarray:
+        """Return the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
+        return self._ik.solve(pose)
+
+    def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
+        """Run one policy step in every task.
+
+        Args:
+            actions: (n, 18) in [−1, 1]; clipped.
+            traces: `trace_dtype` records to fill, (n, 17); None to record nothing.
+
+        Raises:
+            InvalidInputError: wrong shape, or not finite.
+        """
+        actions = array_of(actions, self._actions.shape, "actions")
+        if not np.isfinite(actions).all():
+            raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
+        self._actions[:] = actions
+        if self._pusher is not None:
+            self._pusher.step()
+        ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
+        self.before_step()
+
+        def run(start: int, stop: int) -> None:
+            act(start, stop, self.worlds.controllers, self._limits, self._rule, self._actions)
+            self.worlds.run_some(start, stop, ticks, traces)
+            self.finish(start, stop)
+
+        self.worlds.in_threads(run)
+
+    def before_step(self) -> None:
+        """Take in what was changed from outside since the last step."""
+
+    def observation(self, i: Any = slice(None)) -> dict[str, np.ndarray]:
+        """Return what the policies observe, copied: vectors float32 (n, k), and the task's own."""
+        vectors = {name: self.tasks[name][i].astype(np.float32) for name in self.observed}
+        return {**vectors, **self.own_observation(i)}
+
+    @property
+    def reward(self) -> np.ndarray:
+        """Sum of the reward's terms of the last step, (n,)."""
+        return self.tasks["reward"].sum(axis=1)
+
+    @property
+    def terminated(self) -> np.ndarray:
+        """Whether the task is done or cannot be done any more, (n,)."""
+        return (self.tasks["success"] == 1) | (self.tasks["failed"] == 1)
+
+    @property
+    def truncated(self) -> np.ndarray:
+        """Whether time is up, (n,)."""
+        return ~self.terminated & (self.tasks["steps"] >= self.step_limit)
+
+    def info(self) -> dict[str, np.ndarray]:
+        """Return the reward's terms and the step's figures by name, arrays (n,)."""
+        tasks = self.tasks
+        terms = {f"reward_{name}": tasks["reward"][:, k].copy() for k, name in enumerate(self.reward_terms)}
+        return terms | {
+            **self.own_info(),
+            "tool_force_n": tasks["force_peak"].copy(),
+            "tool_force_mean_n": tasks["force_mean"].copy(),
+            "is_success": tasks["success"] == 1,
+        }
+
+    def parts(self) -> dict[str, Part]:
+        """List what decides the tasks' future, in the order in which it must be put back."""
+        pushes = {} if self._pusher is None else {"pushes": of_generators(self._pusher.rngs)}
+        objects = {**pushes, "worlds": of_object(self.worlds)}
+        return {**self.own_parts(), **objects, "tasks": of_records(self.tasks, self.own_bounds)}
+
+    def snapshot(self) -> dict[str, Any]:
+        """Take all that decides the tasks' future, as plain values and arrays."""
+        return take(self.parts())
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Put the tasks where a snapshot was taken; see `Worlds.restore`."""
+        put(self.parts(), snapshot)
+
+    def _checked(self, config: TaskConfig | None) -> Any:
+        kind = self.config_type
+        if config is not None and not isinstance(config, kind):
+            raise InvalidInputError(
+                f"config is {type(config).__name__}; give a {kind.__name__} ({kind.__module__}), such as "
+                f"{kind.__name__}(episode_s=10.0)"
+            )
+        return config or kind()
+
+    def sort(self) -> tuple[Any, ...]:
+        """Return what decides which code a step compiles."""
+        return (type(self), self.arm.n)
+
+    def scratch(self) -> "Tasks":
+        """Make one task alike to warm up with."""
+        return type(self)(self.config, 1, arm=self.arm, backend=self._backend)
+
+
+_WARM: set[tuple[Any, ...]] = set()
+"""Kinds of tasks whose step this process has compiled or loaded."""
+
+
+def _warm_up(tasks: Tasks) -> None:
+    """Run a step of a task of our own: the first step in a process compiles or loads for a long time."""
+    sort = tasks.sort()
+    if sort in _WARM:
+        return
+    _WARM.add(sort)
+    scratch = tasks.scratch()
+    scratch.reset(0, np.random.default_rng(0))
+    scratch.step(np.zeros((1, ACTION_SIZE)))
+    scratch.worlds.close()

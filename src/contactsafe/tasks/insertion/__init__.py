@@ -1,0 +1,1 @@
+"""Putting a round peg into a hole whose place is known only roughly."""

@@ -1,0 +1,71 @@
+"""The peg, and a block with a hole for it made of boxes."""
+
+import math
+
+from contactsafe.robot.description import Inertia, Tip, Tool
+from contactsafe.robot.franka import HAND
+from contactsafe.sim.fixtures import TABLE_HALF_SIZE, Box, Fixture, Vector3
+
+PEG_RADIUS = 0.01
+"""m."""
+
+_PEG_HALF_LENGTH = 0.03
+_PEG_KG = 0.1
+_TCP = 0.15  # m below the mount
+
+HOLE_DEPTH = 0.03
+"""m."""
+
+_SIDES = 24
+_WALL_HALF = 0.015  # half the radial thickness of the ring about the hole, m
+_BLOCK_HALF = 0.08  # half edge of the block, m
+
+
+def _cylinder(mass: float, centre: Vector3, radius: float, half_length: float) -> Inertia:
+    across = mass * (radius**2 / 4 + half_length**2 / 3)
+    return Inertia(mass, centre, (across, across, mass * radius**2 / 2, 0.0, 0.0, 0.0))
+
+
+PEG = Tool(
+    name="franka hand with peg",
+    inertia=HAND.inertia + _cylinder(_PEG_KG, (0.0, 0.0, _TCP - _PEG_HALF_LENGTH), PEG_RADIUS, _PEG_HALF_LENGTH),
+    tcp=(0.0, 0.0, _TCP),
+    capsules=HAND.capsules[:1],
+    tip=Tip((PEG_RADIUS, PEG_RADIUS, _PEG_HALF_LENGTH), "cylinder"),
+)
+"""The gripper holding a steel peg of 20 mm diameter, 60 mm long; the TCP is the middle of its lower face."""
+
+
+def block(mouth: Vector3, clearance_m: float) -> Fixture:
+    """Return a block with a hole in it, its frame at the middle of the hole's mouth, z upwards.
+
+    The wall is a ring of flat boxes that touch the hole's circle, so that the hole is a polygon about it: at its
+    corners it is wider by 0.9 %. Four boxes make the rest of the upper face, one the floor.
+    """
+    radius, boxes = PEG_RADIUS + clearance_m, []
+    width = (radius + 2 * _WALL_HALF) * math.tan(math.pi / _SIDES)
+    for k in range(_SIDES):
+        angle = 2 * math.pi * k / _SIDES
+        out = radius + _WALL_HALF
+        centre = (out * math.cos(angle), out * math.sin(angle), -HOLE_DEPTH / 2)
+        turned = (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
+        boxes.append(Box(f"wall{k}", centre, (_WALL_HALF, width, HOLE_DEPTH / 2), turned))
+    inner = radius + 2 * _WALL_HALF - 0.004
+    rest = (_BLOCK_HALF - inner) / 2
+    for k, (x, y, half_x, half_y) in enumerate(
+        (
+            (inner + rest, 0.0, rest, _BLOCK_HALF),
+            (-inner - rest, 0.0, rest, _BLOCK_HALF),
+            (0.0, inner + rest, inner, rest),
+            (0.0, -inner - rest, inner, rest),
+        )
+    ):
+        boxes.append(Box(f"side{k}", (x, y, -HOLE_DEPTH / 2), (half_x, half_y, HOLE_DEPTH / 2)))
+    boxes.append(Box("floor", (0.0, 0.0, -HOLE_DEPTH - 0.005), (_BLOCK_HALF, _BLOCK_HALF, 0.005)))
+    return Fixture("block", mouth, tuple(boxes))
+
+
+def table() -> Fixture:
+    """Return the table that the block stands on."""
+    x, y, z = TABLE_HALF_SIZE
+    return Fixture("table", (0.5, 0.0, 0.0), (Box("table", (0.0, 0.0, -z), (x, y, z)),))

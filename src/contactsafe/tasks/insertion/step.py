@@ -1,0 +1,77 @@
+"""What is scored and observed after every policy step, compiled."""
+
+import math
+
+import numpy as np
+
+from contactsafe.core.compiled import compiled
+from contactsafe.tasks.base.record import end_step, observe_arm
+
+REWARD_TERMS = ("approach", "depth", "done", "time", "force", "arm_touched")
+
+_f = np.float64
+
+OWN_FIELDS = (
+    ("mouth", _f, (3,)),  # of the hole, where it truly is, world, m
+    ("axis", _f, (3,)),  # into the hole
+    ("believed", _f, (3,)),  # mouth as it is believed to be, m
+    ("away", _f),  # of the tip from the true mouth, sideways and up together, m
+    ("depth", _f),  # of the tip in the hole, m
+    ("offset", _f, (6,)),  # observed: tool less the believed mouth, m; rotation vector from straight down, rad
+    ("torque", _f, (3,)),  # observed: on the tool, as measured, about its point, world axes, N m
+)
+
+parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m", "radius_m")])
+
+
+@compiled
+def measure(task, position):
+    """Return how far the tip is from the mouth, sideways and up together, and how deep in it, m."""
+    along, sideways = 0.0, 0.0
+    for k in range(3):
+        along += (position[k] - task.mouth[k]) * task.axis[k]
+    for k in range(3):
+        sideways += (position[k] - task.mouth[k] - along * task.axis[k]) ** 2
+    return math.sqrt(sideways) + max(-along, 0.0), max(along, 0.0)
+
+
+@compiled
+def observe(controller, task):
+    """Fill what the policy observes."""
+    observe_arm(controller, task)
+    for k in range(3):
+        task.offset[k] = task.pose[k] - task.believed[k]
+        task.offset[3 + k] = task.pose[3 + k]
+        task.torque[k] = controller.measurement.wrench_ee[3 + k]
+
+
+@compiled
+def score(task, metrics, parameters, position):
+    """Fill the reward's terms of one step, and its ends; potentials, so that nothing is earned in circles."""
+    away, depth = measure(task, position)
+    task.success = 1 if depth >= parameters.depth_m else 0
+    task.failed = metrics.arm_touched
+    excess = min(max(metrics.tool_force_peak / parameters.gentle_n - 1.0, 0.0), 4.0)
+    task.reward[0] = parameters.approach * (task.away - away)
+    task.reward[1] = parameters.depth * (depth - task.depth)
+    task.reward[2] = parameters.done * task.success
+    task.reward[3] = parameters.time
+    task.reward[4] = parameters.force * excess
+    task.reward[5] = parameters.arm_touched * metrics.arm_touched
+    task.away, task.depth = away, depth
+
+
+@compiled(nogil=True)
+def finish(start, stop, worlds, controllers, metrics, parameters, tasks):
+    """Score and observe tasks start to stop; the arrays are those of `Worlds` and `InsertionTasks`."""
+    for i in range(start, stop):
+        score(tasks[i], metrics[i], parameters, worlds[i].truth.position)
+        end_step(metrics[i], tasks[i])
+        observe(controllers[i], tasks[i])
+
+
+@compiled(nogil=True)
+def begin(worlds, controllers, tasks, i):
+    """Measure and observe task i at the start of an episode."""
+    tasks[i].away, tasks[i].depth = measure(tasks[i], worlds[i].truth.position)
+    observe(controllers[i], tasks[i])

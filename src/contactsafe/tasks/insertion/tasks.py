@@ -1,0 +1,85 @@
+"""The insertion task: a round peg, and a hole whose place is known only roughly; force and pose to find it by."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contactsafe.core.rotation import quat_to_matrix, rotvec_to_quat
+from contactsafe.policy.action import DOWN
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.fixtures import TipSurface
+from contactsafe.tasks.base.tasks import Tasks
+from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scene import PEG, PEG_RADIUS, block, table
+from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
+
+_STEEL = TipSurface(friction=0.3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
+"""Steel held between rubber finger tips, which give way: 10 kN/m beneath the arm's 4 kg."""
+
+
+class InsertionTasks(Tasks):
+    """Pegs to be inserted, N at a time.
+
+    Observation: `offset`, tool position less the believed mouth (m), and rotation vector from straight down (rad),
+    (6,); `target`, x_d less the tool's pose (m, rad), K1 (1/s²) and D1 (1/s), (18,); `force` on the peg, smoothed, and
+    `torque` about its tip, as the wrist measures them, world axes (N, N m), (3,) each. No camera.
+    """
+
+    name = "insertion"
+    config_type = InsertionConfig
+    reward_terms = REWARD_TERMS
+    own_fields = OWN_FIELDS
+    observed = ("offset", "target", "force", "torque")
+    varies = True
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """The believed mouth."""
+        return self.config.mouth
+
+    def default_arm(self) -> Arm:
+        """Return a Panda that holds the peg."""
+        return robots.panda(PEG)
+
+    def furnish(self, world: WorldConfig) -> WorldConfig:
+        """Return a world with table and block in it, and a peg of steel."""
+        fixtures = (table(), block(self.config.mouth, self.config.clearance_m))
+        return replace(world, fixtures=fixtures, tip=_STEEL)
+
+    def prepare(self) -> None:
+        """Take the weights for compiled code."""
+        config = self.config
+        self._parameters = np.zeros(1, dtype=parameters_dtype)
+        for name in (*REWARD_TERMS, "gentle_n"):
+            self._parameters[name] = getattr(config.reward, name)
+        self._parameters["depth_m"], self._parameters["radius_m"] = config.depth_m, PEG_RADIUS
+
+    def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
+        """Draw where the hole truly is and how slippery it is; the tool starts above where it is believed to be."""
+        config, task = self.config, self.tasks[i]
+        believed = np.array(config.mouth)
+        error = np.array([*rng.uniform(-config.error_m, config.error_m, 2), 0.0])
+        tilt = rotvec_to_quat(np.array([*rng.uniform(-config.tilt_rad, config.tilt_rad, 2), 0.0]))
+        self.worlds.place_fixture(i, "block", believed + error, tilt)
+        self.worlds.set_tip_friction(i, rng.uniform(*config.friction))
+        task["believed"], task["mouth"] = believed, believed + error
+        task["axis"] = -quat_to_matrix(tilt)[:, 2]
+        start = np.array([0.0, 0.0, rng.uniform(*config.start_m)])
+        return Pose(believed + start, DOWN)
+
+    def begun(self, i: int, rng: np.random.Generator) -> None:
+        """Measure and observe for the first time."""
+        begin(self.worlds.records, self.worlds.controllers, self.tasks, i)
+
+    def finish(self, start: int, stop: int) -> None:
+        """Score and observe, in the worlds from start to stop."""
+        worlds = self.worlds
+        finish(start, stop, worlds.records, worlds.controllers, worlds.metrics, self._parameters[0], self.tasks)
+
+    def own_info(self) -> dict[str, np.ndarray]:
+        """Return how deep the peg is, m, and whether the arm has met table or block."""
+        return {"depth_m": self.tasks["depth"].copy(), "arm_touched": self.tasks["failed"] == 1}
