@@ -36,7 +36,7 @@ def make_engine(engine: str, num_envs: int, config: Any = None):
         A `WipingVectorEnv`.
 
     Raises:
-        InvalidInputError: unknown engine, or one that is not installed.
+        InvalidInputError: there is no such engine, or one that is not installed.
     """
     if engine not in ENGINES:
         raise InvalidInputError(f"engine = {engine!r}; choose {' or '.join(ENGINES)}")

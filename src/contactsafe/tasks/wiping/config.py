@@ -11,7 +11,7 @@ from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.drawings import Boards, check_boards
 from contactsafe.tasks.wiping.randomisation import Randomisation
 
-Sight = Literal["mask", "photograph"]
+ImageSource = Literal["mask", "photograph"]
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class RewardConfig:
     """Weights of the reward's terms; each is reported in `info` as `reward_<name>`.
 
     Attributes:
-        ink: for the whole of the ink, paid in shares as it is wiped off.
+        ink: for the whole of the ink, paid in proportion as it is wiped off.
         done: once, when all is gone.
         approach: per metre by which the nearest ink comes nearer, on steps that wipe nothing.
         contact: per step with the pad on the board under `force_limit_n`.
@@ -56,12 +56,12 @@ class WipingConfig:
     Attributes:
         episode_s: time limit, s.
         controller: preset by name; the free-space law is 'vices'.
-        clean_fraction: share of the ink below which the board counts as clean.
+        clean_fraction: fraction of the ink below which the board counts as clean.
         start_reach: the tool starts within this of the board's centre along x and y, m.
         start_height: range of the tool's height above the board at the start, m.
         boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
             first need `contactsafe[handwriting]`.
-        sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
+        image_source: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
             that changes with every episode; the latter needs `contactsafe[camera]`.
         pushes: on the arm while it works; None for none.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
@@ -78,7 +78,7 @@ class WipingConfig:
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"
-    sight: Sight = "mask"
+    image_source: ImageSource = "mask"
     pushes: Pushes | None = None
     randomisation: Randomisation | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
@@ -88,9 +88,9 @@ class WipingConfig:
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self):
-        """Refuse a time limit, a kind of board or of sight that cannot be."""
+        """Refuse a time limit, a kind of board or an image source that cannot be."""
         check_boards(self.boards)
         if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
             raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
-        if self.sight not in get_args(Sight):
-            raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")
+        if self.image_source not in get_args(ImageSource):
+            raise InvalidInputError(f"image_source = {self.image_source!r}; choose mask or photograph")

@@ -82,23 +82,23 @@ class _Wiping(Independent):
             raise ResetNeeded(f"`{doing}` was called before `reset`; call `reset` first")
 
     def _picture(self, i: int) -> np.ndarray:
-        """Give mask i as an image, uint8 (512, 512, 3)."""
+        """Return mask i as an image, uint8 (512, 512, 3)."""
         return np.kron(self.tasks.boards.masks[i], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
 
 
 def _drawing_of(options: dict[str, Any] | None, *others: str) -> Any:
-    """Give the drawing among the options of a reset, None where there is none; refuse what is not known."""
+    """Return the drawing among the options of a reset, None where there is none; refuse other names."""
     options = options or {}
-    unknown = [str(name) for name in options if name not in ("drawing", *others)]
-    if unknown:
+    others_found = [str(name) for name in options if name not in ("drawing", *others)]
+    if others_found:
         raise InvalidInputError(
-            f"reset options hold {', '.join(unknown)}; known are {', '.join(('drawing', *others))}; leave others out"
+            f"reset options hold {', '.join(others_found)}; known are {', '.join(('drawing', *others))}; leave others out"
         )
     return options.get("drawing")
 
 
 def _seed_of(seed: Any) -> int | None:
-    """Give a seed as Gymnasium's generators want it, NumPy's whole numbers too.
+    """Return a seed as Gymnasium's generators want it, NumPy's whole numbers too.
 
     Raises:
         InvalidInputError: it is no whole number, or negative.
@@ -122,7 +122,7 @@ class WipingEnv(_Wiping, gymnasium.Env):
 
     Args:
         config: of the task.
-        render_mode: 'rgb_array' gives the mask enlarged, or None.
+        render_mode: 'rgb_array' for the mask enlarged, or None.
         max_episode_steps: in place of `config.episode_s`; `gymnasium.make` takes this for the shorter of the two.
     """
 
@@ -157,7 +157,7 @@ class WipingEnv(_Wiping, gymnasium.Env):
         )  # fmt: skip
 
     def render(self):
-        """Give the mask as an image, uint8 (512, 512, 3)."""
+        """Return the mask as an image, uint8 (512, 512, 3)."""
         if self.render_mode is None:
             return None
         self._check_order("render")
@@ -179,7 +179,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
     Args:
         num_envs: N.
         config: of the task.
-        render_mode: 'rgb_array' gives the masks enlarged, or None.
+        render_mode: 'rgb_array' for the masks enlarged, or None.
         max_episode_steps: in place of `config.episode_s`.
     """
 
@@ -206,7 +206,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         """Begin an episode in every task, or in those of `options["reset_mask"]`.
 
         Args:
-            seed: a number seeds environment i with seed + i; a sequence gives one each, None for a random one; None
+            seed: a number seeds environment i with seed + i; a sequence holds one each, None for a random one; None
                 goes on with the generators in use.
             options: `drawing` for all boards; `reset_mask`, bool (N,).
 
@@ -227,7 +227,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         return self.tasks.observation(), {"ink_left": ink_left, "_ink_left": begun}
 
     def _chosen(self, options: Mapping[str, Any]) -> list[int]:
-        """Give the numbers of the tasks to reset."""
+        """Return the numbers of the tasks to reset."""
         if options.get("reset_mask") is None:
             return list(range(self.num_envs))
         mask = np.asarray(options["reset_mask"])
@@ -301,7 +301,7 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
         self._was_reset = bool(self._rngs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Give the masks as images, uint8 (512, 512, 3) each."""
+        """Return the masks as images, uint8 (512, 512, 3) each."""
         if self.render_mode is None:
             return None
         self._check_order("render")

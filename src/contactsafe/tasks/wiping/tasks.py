@@ -1,4 +1,4 @@
-"""N wiping tasks stepped together: what the single and the vector environment share."""
+"""N wiping tasks stepped together: what the single and the vector environment are built on."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from contactsafe.sim.backend import Backend
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
 from contactsafe.sim.worlds import POLICY_RATE_HZ, Worlds, ticks_of_step
-from contactsafe.tasks.base.pushes import Pusher
+from contactsafe.tasks.base.pushes import PushSchedule
 from contactsafe.tasks.wiping.board import furnish, pad_half
 from contactsafe.tasks.wiping.camera import camera_at
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -32,9 +32,9 @@ from contactsafe.tasks.wiping.variation import Variation
 from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 
-def _sight(config: WipingConfig, worlds: Worlds, boards: Whiteboards):
-    """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
-    if config.sight == "mask":
+def _image_source(config: WipingConfig, worlds: Worlds, boards: Whiteboards):
+    """Return what replaces the masks by those seen in photographs, or None; OpenCV is loaded for it alone."""
+    if config.image_source == "mask":
         return None
     from contactsafe.tasks.wiping.photographs import PhotographSource
 
@@ -72,7 +72,7 @@ class WipingTasks(Independent):
     """What computes the physics in place of MuJoCo."""
 
     varies = True
-    """Whether episodes may differ by more than what is drawn on the board."""
+    """Whether episodes may differ by more than what is on the board."""
 
     def __init__(
         self,
@@ -93,9 +93,9 @@ class WipingTasks(Independent):
         self.worlds = Worlds(self.arm, furnished, controller, n, seed, backend=self.backend, **own_models)
         self.boards = Whiteboards(self.config.board, self.config.camera, self.worlds.models, pad_half(self.arm))
         self._variation = None if ranges is None else Variation(self.worlds, self.boards, ranges)
-        self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
+        self._pushes = None if self.config.pushes is None else PushSchedule(self.worlds, self.config.pushes)
         self.tasks = np.zeros(n, dtype=task_dtype)
-        self._sight = _sight(self.config, self.worlds, self.boards)
+        self._image_source = _image_source(self.config, self.worlds, self.boards)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.config.board.centre)
         self._rewards = np.zeros(1, dtype=rewards_dtype)
@@ -129,8 +129,8 @@ class WipingTasks(Independent):
         if self._variation is not None:
             self._variation.draw(i, rng)
         worlds.reset(i, self.posture_over(Pose(np.asarray(start, dtype=float), DOWN)))
-        if self._pusher is not None:
-            self._pusher.begin(i, rng)
+        if self._pushes is not None:
+            self._pushes.begin(i, rng)
         controller = worlds.controllers[i]
         target = controller["target"]
         target["K_task"] = config.action.stiffness_start
@@ -150,7 +150,7 @@ class WipingTasks(Independent):
         )
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
-        task["light"] = 0 if self._sight is None else rng.integers(2**31)
+        task["light"] = 0 if self._image_source is None else rng.integers(2**31)
         self._look_first(i)
 
     def observe(self, i: int) -> None:
@@ -164,16 +164,16 @@ class WipingTasks(Independent):
         observe(
             worlds.records[i]["plant"], worlds.controllers[i], camera, boards.ink_index.shown[i], task, boards.masks[i]
         )
-        if self._sight is not None:
-            self._sight.look(i, i + 1, self.tasks)
+        if self._image_source is not None:
+            self._image_source.look(i, i + 1, self.tasks)
         if self._variation is not None:
             self._variation.look_first(i)
 
     def parts(self) -> dict[str, Part]:
         """List what decides the tasks' future."""
         parts = {} if self._variation is None else {"variation": of_object(self._variation)}
-        if self._pusher is not None:
-            parts["pushes"] = of_generators(self._pusher.rngs)
+        if self._pushes is not None:
+            parts["pushes"] = of_generators(self._pushes.rngs)
         return {
             **parts,
             "worlds": of_object(self.worlds),
@@ -190,7 +190,7 @@ class WipingTasks(Independent):
         put(self.parts(), snapshot)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
-        """Give the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
+        """Compute the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
         return self._ik.solve(pose)
 
     def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
@@ -208,8 +208,8 @@ class WipingTasks(Independent):
         if not np.isfinite(actions).all():
             raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
         self._actions[:] = actions
-        if self._pusher is not None:
-            self._pusher.step()
+        if self._pushes is not None:
+            self._pushes.step()
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
         self._advance(ticks, worlds.no_trace if traces is None else traces)
 
@@ -231,13 +231,13 @@ class WipingTasks(Independent):
 
     def _look(self, start: int, stop: int) -> None:
         """Make of the masks of tasks start to stop what the policy is to see of them."""
-        if self._sight is not None:
-            self._sight.look(start, stop, self.tasks)
+        if self._image_source is not None:
+            self._image_source.look(start, stop, self.tasks)
         if self._variation is not None:
             self._variation.look(start, stop)
 
     def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
-        """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
+        """Return what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
         return {
             **{name: self.tasks[name][i].astype(np.float32) for name in OBSERVED},
             "mask": self.boards.masks[i][..., None].copy(),
@@ -259,7 +259,7 @@ class WipingTasks(Independent):
         return ~self.terminated & (self.tasks["steps"] >= self.step_limit)
 
     def info(self) -> dict[str, np.ndarray]:
-        """Give the reward's terms and the episode's figures by name, arrays (n,)."""
+        """Return the reward's terms and the episode's figures by name, arrays (n,)."""
         tasks = self.tasks
         terms = {f"reward_{name}": tasks["reward"][:, k].copy() for k, name in enumerate(REWARD_TERMS)}
         return terms | {
@@ -279,7 +279,7 @@ def _warm_up(tasks: WipingTasks) -> None:
     """Wipe for one step on a board of our own: the first step in a process compiles or loads for a long time."""
     kind = next(kind for kind in type(tasks).__mro__ if kind.__module__.startswith("contactsafe."))
     config = tasks.config
-    sort = (kind, config.sight, config.randomisation is not None)
+    sort = (kind, config.image_source, config.randomisation is not None)
     if sort in _WARM:
         return
     _WARM.add(sort)
