@@ -74,7 +74,7 @@ def _wipe(task: str, config: WipingConfig) -> None:
 
 
 def _photograph() -> None:
-    _wipe(ENGINES["mujoco"], WipingConfig(sight="photograph"))
+    _wipe(ENGINES["mujoco"], WipingConfig(image_source="photograph"))
 
 
 def _wipe_in_bullet() -> None:

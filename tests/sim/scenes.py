@@ -1,4 +1,4 @@
-"""Worlds that the tests of this room share: an arm over the board, led by hand."""
+"""Worlds that the tests of this room share: an arm over a plate, its targets set by hand."""
 
 from functools import cache
 
@@ -31,9 +31,9 @@ def posture(position, quat=DOWN):
     return InverseKinematics(panda()).solve(Pose(np.array(position, dtype=float), np.array(quat)), panda().home)
 
 
-def worlds_at(position, config=CALM, preset="safe", n=1, seed=0, quat=DOWN, engine=Worlds):
+def worlds_at(position, config=CALM, preset="safe", n=1, seed=0, quat=DOWN, backend=None):
     """Make N worlds whose arms rest with the tool at a place, held there."""
-    worlds = engine(panda(), config, presets.by_name(preset), n, seed)
+    worlds = Worlds(panda(), config, presets.by_name(preset), n, seed, backend=backend)
     q = posture(position, quat)
     for i in range(n):
         worlds.reset(i, q)
@@ -41,7 +41,7 @@ def worlds_at(position, config=CALM, preset="safe", n=1, seed=0, quat=DOWN, engi
 
 
 def aim(worlds, position, i=0, stiffness=150.0, follow=True, quat=DOWN):
-    """Lead the tool of world i to a place; `follow`: the null-space posture goes there too."""
+    """Set the target of world i; `follow`: the null-space posture goes there too."""
     target = worlds.controllers[i]["target"]
     target["position"], target["quat"] = position, quat
     target["K_task"], target["D_task"] = stiffness, 2.0 * np.sqrt(stiffness)
@@ -50,7 +50,7 @@ def aim(worlds, position, i=0, stiffness=150.0, follow=True, quat=DOWN):
 
 
 def run(worlds, ticks):
-    """Run this many ticks and give every tick's record, (n, ticks)."""
+    """Run this many ticks and return every tick's record, (n, ticks)."""
     pieces = []
     while ticks > 0:
         count = min(ticks, MAX_TICKS)
@@ -62,7 +62,7 @@ def run(worlds, ticks):
 
 
 FOREARM_REST = (0.14, -0.13, 0.55)
-"""A place that the forearm passes when the tool goes to the right along the board."""
+"""A place that the forearm passes when the tool goes to the right along the plate."""
 
 
 def contact_wrench(model, data, geom, point):

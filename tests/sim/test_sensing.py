@@ -10,9 +10,8 @@ from tests.sim.scenes import BOARD_Z, CALM, aim, contact_wrench, panda, posture,
 from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, PlantConfig, SensorConfig, WorldConfig
-from contactsafe.sim.truth import noise_channels
 from contactsafe.sim.scene import build_plant
-from contactsafe.sim.stepping import sense
+from contactsafe.sim.sensing import noise_channels, sense
 
 OVER, ON = (0.5, 0.0, BOARD_Z + 0.06), (0.5, 0.0, BOARD_Z + 0.0005)
 
@@ -23,7 +22,7 @@ def test_pressed_at_rest_the_wrist_reads_the_contact(depth):
     aim(worlds, (0.5, 0.0, BOARD_Z - depth))
     trace = run(worlds, 1500)[0]
     point = worlds.controllers[0]["output"]["position"]
-    true = contact_wrench(worlds.models[0], worlds.datas[0], "pad", point)
+    true = contact_wrench(worlds.models[0], worlds.datas[0], "tip", point)
     assert true[2] > 2.0
     assert_allclose(trace["tool_force"][-1], true[:3], rtol=0, atol=1e-9)
     assert np.abs(trace["wrench_ee"][-100:, :3] - trace["tool_force"][-100:]).max() < 0.1
@@ -59,7 +58,7 @@ def sensed(worlds, rows):
     measurement = worlds.controllers[0]["measurement"]
     seen = {name: np.empty((rows, *measurement[name].shape)) for name in ("q", "qd", "wrench_ee")}
     for k in range(rows):
-        sense(worlds.plants[0], worlds.controllers[0], rng.standard_normal(noise_channels(7)))
+        sense(worlds.records[0], worlds.controllers[0], rng.standard_normal(noise_channels(7)))
         for name, values in seen.items():
             values[k] = measurement[name]
     return seen
@@ -93,12 +92,12 @@ def test_bias_is_drawn_at_reset_and_stays():
     sensors = replace(NO_NOISE, force_bias_n=0.2, moment_bias_nm=0.01)
     worlds = worlds_at(OVER, WorldConfig(sensors=sensors))
     trace = run(worlds, 300)[0]
-    bias = worlds.plants[0]["wrench_bias"].copy()
+    bias = worlds.records[0]["errors"]["wrench_bias"].copy()
     assert_allclose(np.linalg.norm(trace["wrench_ee"][-1, :3]), np.linalg.norm(bias[:3]), rtol=0, atol=0.02)
     q, drawn = posture(OVER), []
     for _ in range(300):
         worlds.reset(0, q)
-        drawn.append(worlds.plants[0]["wrench_bias"].copy())
+        drawn.append(worlds.records[0]["errors"]["wrench_bias"].copy())
     assert_allclose(np.std(drawn, axis=0), [0.2] * 3 + [0.01] * 3, rtol=0.15)
 
 
@@ -120,7 +119,7 @@ def test_the_controllers_model_is_not_the_plant(plant):
     for p in (PlantConfig(), plant):
         worlds = worlds_at(OVER, WorldConfig(plant=p, sensors=NO_NOISE))
         controller = worlds.controllers[0]
-        sense(worlds.plants[0], controller, np.zeros(noise_channels(7)))
+        sense(worlds.records[0], controller, np.zeros(noise_channels(7)))
         controller["measurement"]["qd"], controller["measurement"]["wrench_ee"] = 0.1, 0.0
         tick_at(worlds.controllers, 0)
         seen.append((controller["dynamics"].copy(), controller["output"].copy()))
@@ -131,10 +130,10 @@ def test_the_controllers_model_is_not_the_plant(plant):
 
 def test_once_sensed_the_plant_may_change_unseen():
     torques = []
-    for spoil in (False, True):
+    for corrupt in (False, True):
         worlds = worlds_at(OVER, CALM)
-        sense(worlds.plants[0], worlds.controllers[0], np.zeros(noise_channels(7)))
-        if spoil:
+        sense(worlds.records[0], worlds.controllers[0], np.zeros(noise_channels(7)))
+        if corrupt:
             data = worlds.datas[0]
             for name in ("qpos", "qvel", "xpos", "xmat", "sensordata", "qfrc_constraint", "cvel"):
                 getattr(data, name)[:] = np.nan
@@ -175,9 +174,9 @@ def test_filtered_velocity_is_the_low_passed_difference_of_what_the_encoders_say
     """A first-order low-pass of the stated cut-off, at rest from the start."""
     sensors = replace(NO_NOISE, encoder_step_rad=1e-4, velocity_filter_hz=50.0)
     q, qd, *_ = readings(sweeping(sensors), 400)
-    share, expected = 1.0 - np.exp(-2 * np.pi * 50.0 * 0.001), np.zeros(7)
+    gain, expected = 1.0 - np.exp(-2 * np.pi * 50.0 * 0.001), np.zeros(7)
     for k in range(1, 400):
-        expected = expected + share * ((q[k] - q[k - 1]) / 0.001 - expected)
+        expected = expected + gain * ((q[k] - q[k - 1]) / 0.001 - expected)
         assert_allclose(qd[k], expected, rtol=0, atol=1e-9)
     assert_array_equal(qd[0], 0.0)
     assert np.abs(qd).max() > 0.1
@@ -237,7 +236,7 @@ def test_one_scale_is_the_same_for_every_link_and_one_each_is_each_links_own():
 def test_friction_of_each_joint_has_its_own_scale():
     scales = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
     plain, scaled = (
-        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=s), sensors=NO_NOISE)).plants[0]["friction"]
+        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=s), sensors=NO_NOISE)).records[0]["errors"]["friction"]
         for s in (1.0, scales)
     )
     assert_array_equal(plain, panda().friction)
@@ -260,7 +259,7 @@ def test_a_lighter_tool_weighs_less_and_shows_so_at_the_wrist():
         ({"inertia_scale": (1.0, 1.1)}, "inertia_scale has 2 numbers; give one, or one for each of 7 joints"),
         (
             {"payload_kg": -0.83},
-            "payload_kg = -0.83 takes more than the 0.83 kg that tool 'franka hand with wiping pad' weighs; "
+            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiping pad'; "
             "give a larger one",
         ),
     ],

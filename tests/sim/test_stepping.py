@@ -11,19 +11,19 @@ from tests.sim.scenes import BOARD_Z, CALM, DOWN, aim, panda, posture, run, worl
 
 from contactsafe.control.controller import Controller, Measurement, Target
 from contactsafe.control.presets import by_name
-from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Pose
-from contactsafe.sim.config import BoardConfig, Obstacle, PlantConfig, SensorConfig, WorldConfig
+from contactsafe.sim.config import PlantConfig, SensorConfig, WorldConfig
+from contactsafe.sim.fixtures import Box, Fixture, workbench
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.stepping import act, sense
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 TICKS = 36 * MAX_TICKS
 START, GOAL = (0.5, 0.0, BOARD_Z + 0.004), (0.5, -0.12, BOARD_Z - 0.006)
 IN_THE_WAY = Obstacle((0.14, -0.13, 0.55), radius=0.05, stiffness=3000.0)
 BUSY = WorldConfig(obstacles=(IN_THE_WAY,))
-"""Noise, the board under the pad, and something for the forearm to meet."""
+"""Noise, a plate under the tip, and something for the forearm to meet."""
 
 STATE = ("qpos", "qvel", "ctrl", "qfrc_applied", "sensordata")
 
@@ -39,33 +39,6 @@ def busy_worlds(config=BUSY, n=1, seed=3, preset="safe"):
 def assert_same_state(mine, theirs):
     for name in STATE:
         assert_array_equal(getattr(mine, name), getattr(theirs, name), err_msg=name)
-
-
-def step_by_hand(worlds, ticks):
-    """The loop of `run_ticks` through `mujoco.mj_step` and the compiled laws called from Python; one world."""
-    plant, controller = worlds.plants[0], worlds.controllers[0]
-    torques = []
-    for tick in range(ticks):
-        if tick % MAX_TICKS == 0:
-            noise = worlds.sample_noise()[0]
-        sense(plant, controller, noise[tick % MAX_TICKS])
-        tick_at(worlds.controllers, 0)
-        act(plant, controller, noise[tick % MAX_TICKS])
-        mujoco.mj_step(worlds.models[0], worlds.datas[0])
-        plant["tick"] += 1
-        torques.append(controller["output"]["torque"].copy())
-    return np.array(torques)
-
-
-@pytest.mark.parametrize("preset", ["vices", "safe"])
-def test_native_loop_is_bit_identical_to_mj_step_called_from_python(preset):
-    native, by_hand = busy_worlds(preset=preset), busy_worlds(preset=preset)
-    trace = run(native, TICKS)[0]
-    torques = step_by_hand(by_hand, TICKS)
-    assert_array_equal(trace["torque"], torques)
-    assert_same_state(native.datas[0], by_hand.datas[0])
-    assert np.linalg.norm(trace["tool_force"], axis=1).max() > 1.0
-    assert trace["obstacle_force"].max() > 1.0
 
 
 class NumpyLoop:
@@ -111,8 +84,8 @@ class NumpyLoop:
         point = self.data.xpos[body] + turned(self.data.xmat[body].reshape(3, 3), (0.0, 0.05, 0.0))
         J = np.zeros((3, self.model.nv))
         mujoco.mj_jac(self.model, self.data, J, np.zeros_like(J), point, body)
-        share = min(1.0, (self.tick - 300 + 1) / 20)
-        return sum(J[k, :7] * f * share for k, f in enumerate((0.0, 20.0, 5.0)))
+        fraction = min(1.0, (self.tick - 300 + 1) / 20)
+        return sum(J[k, :7] * f * fraction for k, f in enumerate((0.0, 20.0, 5.0)))
 
     def step(self):
         out = self.controller.step(
@@ -185,13 +158,13 @@ def test_a_delayed_torque_arrives_one_tick_later():
     prompt, late = (
         busy_worlds(WorldConfig(sensors=CALM.sensors, plant=PlantConfig(torque_delay_ticks=d))) for d in (0, 1)
     )
-    sent, held = run(prompt, 1)[0]["torque"][0], late.plants[0]["tau_delayed"].copy()
+    sent, held = run(prompt, 1)[0]["torque"][0], late.records[0]["errors"]["tau_delayed"].copy()
     run(late, 1)
     assert_array_equal(prompt.datas[0].ctrl, sent)
     assert_array_equal(late.datas[0].ctrl, held)
     second = run(late, 1)[0]["torque"][0]
     assert_array_equal(late.datas[0].ctrl, sent)
-    assert_array_equal(late.plants[0]["tau_delayed"], second)
+    assert_array_equal(late.records[0]["errors"]["tau_delayed"], second)
 
 
 def test_worlds_of_other_plants_differ():
@@ -201,20 +174,42 @@ def test_worlds_of_other_plants_differ():
         assert np.abs(other - ends[0]).max() > 1e-4
 
 
-@pytest.mark.parametrize(
-    ("configs", "text"),
-    [
-        ([CALM, CALM], "2 world configurations for 3 worlds; give one, or one each"),
-        (
-            [CALM, CALM, WorldConfig(board=BoardConfig(friction=0.2))],
-            "worlds that step together must have the same board and camera; step the others apart",
-        ),
-    ],
-)
-def test_configurations_that_do_not_fit_are_refused(configs, text):
+def test_a_configuration_too_few_is_refused():
     with pytest.raises(InvalidInputError) as caught:
-        Worlds(panda(), configs, n=3)
-    assert str(caught.value) == text
+        Worlds(panda(), [CALM, CALM], n=3)
+    assert str(caught.value) == "2 world configurations for 3 worlds; give one, or one each"
+
+
+def test_worlds_of_other_fixtures_step_together_as_each_does_alone():
+    """A step for the tip to land on, a bare bench, and nothing at all."""
+    step = Fixture("step", (0.5, 0.0, BOARD_Z + 0.01), (Box("top", (0.0, 0.0, -0.005), (0.1, 0.1, 0.005)),))
+    configs = [WorldConfig(fixtures=fixtures) for fixtures in ((workbench(), step), (workbench(),), ())]
+    goal = (0.5, 0.0, BOARD_Z + 0.004)
+    above = (0.5, 0.0, BOARD_Z + 0.012)
+    together = worlds_at(above, configs, n=3)
+    for i in range(3):
+        aim(together, goal, i)
+    traces = run(together, 30 * MAX_TICKS)
+    together.close()
+    forces = np.linalg.norm(traces["tool_force"], axis=2).max(axis=1)
+    assert forces[0] > 1.0
+    assert not forces[1:].any()
+    assert_array_equal(traces["q"][1], worlds_alone(configs[1], above, goal, 1))
+
+
+def worlds_alone(config, start, goal, stream):
+    """Run a world with the noise that the one of this number has among three; joint positions, (ticks, 7), rad."""
+    worlds = worlds_at(start, config)
+    worlds.rngs = [np.random.Generator(np.random.SFC64(np.random.SeedSequence(0).spawn(3)[stream]))]
+    worlds.reset(0, posture(start))
+    aim(worlds, goal)
+    return run(worlds, 30 * MAX_TICKS)[0]["q"]
+
+
+def test_two_fixtures_of_one_name_are_refused():
+    with pytest.raises(InvalidInputError) as caught:
+        WorldConfig(fixtures=(workbench(), workbench()))
+    assert str(caught.value) == "fixtures are workbench, workbench; give at most 4, each with a name of its own"
 
 
 @pytest.mark.parametrize(

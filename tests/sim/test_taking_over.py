@@ -23,8 +23,8 @@ def largest_step(worlds, before, after):
     return np.abs(np.diff(torque, axis=0)).max() / worlds.controllers["params"]["torque_step"][0]
 
 
-def test_a_tool_that_presses_on_the_board_is_taken_over_without_a_jump_or_a_false_contact():
-    """It is held where it is: the press fades, and the tool neither leaves nor is driven into the board."""
+def test_a_tool_that_presses_on_the_plate_is_taken_over_without_a_jump_or_a_false_contact():
+    """It is held where it is: the press fades, and the tool neither leaves nor is driven into the plate."""
     worlds = worlds_at((0.5, 0.0, 0.0105), REAL)
     aim(worlds, (0.5, 0.0, -0.006), follow=False)
     before, after = taken_over(worlds)
@@ -38,7 +38,7 @@ def test_a_tool_that_presses_on_the_board_is_taken_over_without_a_jump_or_a_fals
 
 
 @pytest.mark.parametrize("place", [(0.4, 0.3, 0.25), (0.6, -0.25, 0.3), (0.35, 0.0, 0.5)])
-def test_an_arm_on_its_way_is_taken_over_without_a_jump_or_a_false_contact(place):
+def test_a_moving_arm_is_taken_over_without_a_jump_or_a_false_contact(place):
     worlds = worlds_at((0.5, 0.0, 0.15), REAL)
     aim(worlds, place)
     run(worlds, 100)

@@ -21,7 +21,8 @@ from tests.sim.scenes import (
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.shape import arm_capsules
-from contactsafe.sim.config import NO_NOISE, Obstacle, WorldConfig, bottle, thrust_meter
+from contactsafe.sim.config import NO_NOISE, WorldConfig
+from contactsafe.sim.obstacles import Obstacle, bottle, thrust_meter
 
 OVER = (0.5, 0.0, BOARD_Z + 0.05)
 RIGHT = (0.5, -0.15, BOARD_Z + 0.05)
@@ -36,7 +37,7 @@ def beside_forearm(make, y=-0.06):
 
 
 def pressed(make, preset="vices", ticks=3000):
-    """Lead the tool to the right until the forearm leans on the obstacle."""
+    """Move the tool to the right until the forearm leans on the obstacle."""
     obstacle = beside_forearm(make)
     worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), preset)
     aim(worlds, RIGHT)
@@ -57,7 +58,7 @@ def test_at_rest_force_is_stiffness_times_displacement(make):
 
 @pytest.mark.parametrize("make", [bottle, thrust_meter])
 def test_tau_arm_is_the_obstacles_contact_through_its_jacobian(make):
-    """At every stage: before, at the blow, and leaning."""
+    """At every stage: before, at the impact, and leaning."""
     obstacle = beside_forearm(make)
     worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), "vices")
     aim(worlds, RIGHT)
@@ -70,7 +71,7 @@ def test_tau_arm_is_the_obstacles_contact_through_its_jacobian(make):
     assert largest > 3.0
 
 
-def test_tau_arm_is_the_obstacles_alone_while_the_pad_presses_too():
+def test_tau_arm_is_the_obstacles_alone_while_the_tip_presses_too():
     obstacle = beside_forearm(bottle)
     worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.0005), WorldConfig(sensors=NO_NOISE, obstacles=(obstacle,)), "vices")
     aim(worlds, (0.5, -0.15, BOARD_Z - 0.008))
@@ -81,7 +82,7 @@ def test_tau_arm_is_the_obstacles_alone_while_the_pad_presses_too():
     assert_allclose(row["tau_arm"], true, rtol=0, atol=1e-6)
 
 
-def test_the_pad_alone_is_no_contact_of_the_arm():
+def test_the_tip_alone_is_no_contact_of_the_arm():
     worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.0005))
     aim(worlds, (0.5, 0.06, BOARD_Z - 0.01))
     trace = run(worlds, 1500)[0]
@@ -169,14 +170,14 @@ def travelling(travel=(0.1, -0.05, 0.02), travel_s=(0.2, 0.7)):
     return Obstacle(FAR, radius=0.05, stiffness=2e4, damping_ratio=1.0, travel=travel, travel_s=travel_s)
 
 
-def test_an_obstacle_travels_its_way_in_its_time_and_stays_there():
+def test_an_obstacle_travels_its_displacement_in_its_time_and_stays_there():
     """At constant speed; on its springs it comes to rest within 0.1 mm of where it is held."""
     worlds = worlds_at(OVER, WorldConfig(sensors=NO_NOISE, obstacles=(travelling(),)))
-    way = run(worlds, 1500)[0]["obstacle_position"][:, 0] - np.array(FAR)
-    assert_allclose(way[:200], 0.0, atol=1e-9)
-    assert_allclose(way[450], np.array((0.1, -0.05, 0.02)) / 2, atol=0.004)
-    assert_allclose(way[-1], (0.1, -0.05, 0.02), atol=1e-4)
-    assert np.abs(np.diff(way, axis=0)).max() < 0.1 / 500 * 1.05
+    moved = run(worlds, 1500)[0]["obstacle_position"][:, 0] - np.array(FAR)
+    assert_allclose(moved[:200], 0.0, atol=1e-9)
+    assert_allclose(moved[450], np.array((0.1, -0.05, 0.02)) / 2, atol=0.004)
+    assert_allclose(moved[-1], (0.1, -0.05, 0.02), atol=1e-4)
+    assert np.abs(np.diff(moved, axis=0)).max() < 0.1 / 500 * 1.05
 
 
 def test_reset_puts_a_travelling_obstacle_back():
@@ -204,7 +205,7 @@ def test_a_travelling_obstacle_beside_one_that_stays_moves_alone():
     assert_allclose(last[1], ARRIVED, atol=1e-4)
 
 
-def test_an_obstacle_stops_for_good_once_it_presses_hard_enough_and_starts_anew_after_reset():
+def test_an_obstacle_stops_for_good_once_it_presses_with_its_limit_and_starts_anew_after_reset():
     resting = beside_forearm(bottle, y=0.0)
     away = np.array(resting.position) - (0.0, 0.03, 0.0)
     thing = replace(resting, position=tuple(away), travel=(0.0, 0.08, 0.0), travel_s=(0.1, 1.1), travel_until_n=4.0)

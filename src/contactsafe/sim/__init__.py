@@ -1,1 +1,1 @@
-"""The world: scene, whiteboard and ink, camera, obstacles, sensing and plant errors, native stepping."""
+"""Simulated worlds that know no task: fixtures, obstacles, backends, errors of sensors and motors, native stepping."""

@@ -16,7 +16,7 @@ class Backend(Protocol):
     """One arm and what stands about it, in some engine."""
 
     def reset(self, q: np.ndarray) -> None:
-        """Put the arm at rest at q (n,) rad; everything else is as it was built."""
+        """Put the arm at rest at q (n,) rad, its motors holding its nominal weight; all else is as it was built."""
 
     def read(self, world: np.void) -> None:
         """Fill `truth` of a `world_dtype` record, all of it."""
@@ -34,7 +34,7 @@ class Backend(Protocol):
         """Give the tool's tip another Coulomb coefficient, from the next reset on."""
 
     def close(self) -> None:
-        """Let go of what the engine holds."""
+        """Release what the engine holds."""
 
 
 def run_backend(backend: Backend, i: int, worlds, controllers, noise, ticks, metrics, samples, traces) -> None:

@@ -30,8 +30,8 @@ GEAR = 1000.0
 
 _ROTOR_KG = 1e-6  # the links' masses of Gaz et al. contain the motors
 
-# Of each corner of the tip: MuJoCo's felt was measured at 4.8 kN/m; its damping ratio of 0.4, of the 7 kg that the arm
-# weighs along a table's normal, is 0.4 · 2 √(4 · 4800 · 7) / 4.
+# Of each corner of the tip: MuJoCo's felt was measured at 4.8 kN/m; its damping ratio of 0.4, of the 7 kg of the arm's
+# inertia along a table's normal, is 0.4 · 2 √(4 · 4800 · 7) / 4.
 _TIP_N_M, _TIP_NS_M = 4800.0, 73.0
 
 _ITERATIONS = 20  # of the solver: against 400, a stroke at 10 N differs by 1 µm and 0.05 N at most
@@ -145,7 +145,7 @@ class BulletBackend(Unique):
         self.reset(arm.home)
 
     def reset(self, q) -> None:
-        """Put the arm at rest at q (n,) rad, in a world built anew: nothing of what was before is left."""
+        """Put the arm at rest at q (n,) rad, in a world built anew."""
         bullet, client = self._bullet, self._client
         bullet.resetSimulation(physicsClientId=client)
         bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)

@@ -42,7 +42,7 @@ class PlantConfig:
 
 
 def per_joint(value: float | tuple[float, ...], n: int, name: str) -> np.ndarray:
-    """Give one number for each of n joints, (n,).
+    """Return one number for each of n joints, (n,).
 
     Raises:
         InvalidInputError: neither one number nor n.
@@ -98,7 +98,7 @@ class WorldConfig:
         sensors: their errors.
         fixtures: what stands about the arm and does not move.
         tip: surface of the tool's tip, for its contacts.
-        obstacles: things in the way.
+        obstacles: that the arm may meet.
     """
 
     plant: PlantConfig = field(default_factory=PlantConfig)

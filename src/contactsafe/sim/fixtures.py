@@ -43,7 +43,7 @@ class Fixture:
         position: of its frame, world, m.
         boxes: its shape.
         quat: orientation of its frame, w x y z.
-        solref: MuJoCo's contact time constant, s, and damping ratio; by default four ticks, hard plastic on metal.
+        solref: MuJoCo's contact time constant, s, and damping ratio; by default four ticks, plastic on metal.
     """
 
     name: str

@@ -23,9 +23,9 @@ class Obstacle:
         damping_ratio: of spring and mass.
         half_length: of a standing cylinder, m; 0 for a sphere.
         surface_s: time constant of MuJoCo's contact, s: the larger, the softer its surface (0.02 is MuJoCo's default).
-        travel: way that its hold moves, world, m.
+        travel: displacement of its hold, world, m.
         travel_s: when it sets off and when it arrives, s since reset.
-        travel_until_n: its hold stops for good once it presses this hard on the arm, N; inf to go all the way.
+        travel_until_n: force on the arm at which its hold stops for good, N; inf for never.
     """
 
     position: Vector3
@@ -64,10 +64,10 @@ class Obstacle:
 
 
 def bottle(position: Vector3) -> Obstacle:
-    """Give a plastic water bottle held in a hand: 2 kN/m."""
+    """Return a plastic water bottle held in a hand: 2 kN/m."""
     return Obstacle(position, radius=0.035, stiffness=2000.0, mass=0.5, half_length=0.09)
 
 
 def thrust_meter(position: Vector3) -> Obstacle:
-    """Give a hand-held force gauge: 20 kN/m."""
+    """Return a hand-held force gauge: 20 kN/m."""
     return Obstacle(position, radius=0.02, stiffness=20000.0, mass=1.0)

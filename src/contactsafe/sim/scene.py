@@ -57,7 +57,7 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
 
 
 def perturbed(description: ArmDescription, plant: PlantConfig) -> ArmDescription:
-    """Give the description of an arm whose links weigh something else than the controller believes."""
+    """Return the description of an arm whose inertias differ from what the controller believes."""
     scales = per_joint(plant.inertia_scale, len(description.links), "inertia_scale")
     links = tuple(
         replace(link, inertia=_scaled(link.inertia, float(scale)))
@@ -72,18 +72,18 @@ def _scaled(inertia: Inertia, scale: float) -> Inertia:
 
 
 def loaded(tool: Tool, plant: PlantConfig) -> Tool:
-    """Give a tool with the payload that the controller does not know of.
+    """Return a tool with the payload that the controller does not know of.
 
     Raises:
-        InvalidInputError: the payload takes more than the tool weighs.
+        InvalidInputError: the payload takes more than the tool's mass.
     """
     if plant.payload_kg == 0.0:
         return tool
     if plant.payload_kg < 0:
         if plant.payload_kg <= -tool.inertia.mass:
             raise InvalidInputError(
-                f"payload_kg = {plant.payload_kg} takes more than the {tool.inertia.mass:g} kg that tool "
-                f"'{tool.name}' weighs; give a larger one"
+                f"payload_kg = {plant.payload_kg} takes more than the {tool.inertia.mass:g} kg of tool "
+                f"'{tool.name}'; give a larger one"
             )
         return replace(tool, inertia=_scaled(tool.inertia, 1.0 + plant.payload_kg / tool.inertia.mass))
     point = Inertia(plant.payload_kg, tool.inertia.com, (1e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0))

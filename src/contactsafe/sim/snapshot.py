@@ -23,7 +23,7 @@ class Part(NamedTuple):
     """One piece of an object's state.
 
     Attributes:
-        take: gives its value now, a copy.
+        take: returns its value now, a copy.
         put: sets it to a value that `take` gave.
         check: raises InvalidInputError for a value that no `take` can have given.
     """
@@ -169,7 +169,7 @@ def of_physics(models: Sequence[mujoco.MjModel], datas: Sequence[mujoco.MjData])
 
 
 def generator_state(generator: np.random.Generator) -> dict[str, Any]:
-    """Give the state of a random generator as numbers, strings and lists."""
+    """Return the state of a random generator as numbers, strings and lists."""
     return _plain(generator.bit_generator.state)
 
 

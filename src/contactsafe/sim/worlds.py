@@ -97,7 +97,7 @@ class Worlds(Independent):
         n: how many.
         seed: of the sensors' noise and bias; world i draws from its own stream. One for all, or one for each: then
             what a world does depends on nothing but its own.
-        shared: whether worlds alike share a model; false where each is changed from episode to episode.
+        shared: whether equal configurations use one model; false where models change from episode to episode.
         backend: what computes the physics in place of MuJoCo: `backend(arm, config, tick_s)` makes one for each world.
             It steps in Python, one world after the other.
 
@@ -236,7 +236,7 @@ class Worlds(Independent):
         return self._noise
 
     def in_threads(self, run) -> None:
-        """Call run(start, stop) over all worlds, one share a thread; errors surface here."""
+        """Call run(start, stop) on consecutive ranges of worlds, one a thread; raise what they raise."""
         if self.n == 1 or self.backends:
             run(0, self.n)
             return
@@ -271,7 +271,7 @@ class Worlds(Independent):
             _mirror_one(self.records, i)
 
     def _checked(self, ticks, trace: np.ndarray | None) -> np.ndarray:
-        """Give the ticks of each world, (n,), once they and the trace are sound."""
+        """Return the ticks of each world, (n,), after checking them and the trace."""
         ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
         most = int(ticks.max())
         if ticks.min() < 1 or most > MAX_TICKS:

@@ -1,1 +1,1 @@
-"""What every task shares."""
+"""What all tasks are built on."""

@@ -219,7 +219,7 @@ class TaskVectorEnv(_Environment, gymnasium.vector.VectorEnv):
         """Begin an episode in every task, or in those of `options["reset_mask"]`.
 
         Args:
-            seed: a number seeds environment i with seed + i; a sequence gives one each, None for a random one; None
+            seed: a number seeds environment i with seed + i; a sequence holds one each, None for a random one; None
                 goes on with the generators in use.
             options: those of the task, for all; `reset_mask`, bool (N,).
 

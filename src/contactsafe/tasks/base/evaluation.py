@@ -10,9 +10,9 @@ CONTACT_N = 0.5
 
 FIGURES = {
     "episodes": "boards wiped, one episode each",
-    "success": "share of boards wiped clean (99.8 % of the ink gone, unless told otherwise), which ends the episode",
-    "cleared_99": "share of boards with 99 % of their ink gone within the time limit",
-    "ink_removed_mean": "share of a board's ink that was wiped off: mean",
+    "success": "fraction of boards wiped clean (99.8 % of the ink gone, unless told otherwise), which ends the episode",
+    "cleared_99": "fraction of boards with 99 % of their ink gone within the time limit",
+    "ink_removed_mean": "fraction of a board's ink that was wiped off: mean",
     "ink_removed_median": "the same: median",
     "ink_removed_p10": "the same: 10th percentile",
     "time_mean_s": "length of an episode, s: mean; 20 s where nothing ended it before, such as a clean board",
@@ -22,10 +22,10 @@ FIGURES = {
     "peak_force_max_n": "the same: largest of all",
     "contact_force_median_n": "force on the tool, N, the largest of each policy step in contact: median",
     "arm_table_contacts": "episodes ended because something other than the pad met board or table",
-    "contact_fraction": "share of all policy steps in which the tool was in contact; the rest goes from patch to patch",
+    "contact_fraction": "fraction of all policy steps in which the tool was in contact; the rest goes from patch to patch",
     "return_mean": "sum of an episode's rewards: mean",
 }
-"""What `evaluate_policy` gives, in its order, and what it means; forces are the simulator's."""
+"""What `evaluate_policy` returns, in its order, and what it means; forces are the simulator's."""
 
 HELD_OUT_SEED = 1_000_003
 """Added to the seeds of boards that are never trained on."""

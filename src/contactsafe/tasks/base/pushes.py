@@ -1,4 +1,4 @@
-"""Somebody who leans on the arm now and then while it works: for tests of what the controller shields the task from."""
+"""Pushes on the arm, scheduled at random while it works: for tests of what the controller shields the task from."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Pushes:
-    """Pushes one after the other; each draws evenly from the ranges.
+    """Pushes one after the other; each is sampled evenly from the ranges.
 
     Attributes:
-        force_n: how hard, N, in any direction.
+        force_n: N, in any direction.
         lasting_s: how long, s.
         pause_s: between the end of one and the start of the next, s.
         links: which ones are pushed.
@@ -37,12 +37,12 @@ class Pushes:
             raise InvalidInputError(f"pushes links = {self.links}; give some of 1 to 7")
 
 
-class Pusher(Independent):
-    """Pushes the arms of some worlds.
+class PushSchedule(Independent):
+    """Schedules pushes on the arms of some worlds.
 
     Args:
         worlds: whose arms.
-        pushes: how.
+        pushes: ranges that they are sampled from.
 
     Attributes:
         rngs: the generator of each world's episode.

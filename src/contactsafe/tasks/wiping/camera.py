@@ -1,7 +1,7 @@
 """What the camera sees: the segmented mask of the board, ink 0 and everything else 255, by homography.
 
 The board is a plane, so a pixel of the mask is a place on the board: each inked cell marks the pixels its corners fall
-in. The arm stands before the board: a marked pixel whose line of sight meets one of the arm's shapes is unmarked.
+in. The arm stands before the board: a marked pixel whose ray meets one of the arm's shapes is unmarked.
 """
 
 import math
@@ -21,11 +21,11 @@ from contactsafe.tasks.wiping.whiteboard import Whiteboard
 
 INK_PIXEL, OTHER_PIXEL = 0, 255
 
-_MOST_CELLS, _MOST_ROWS = 2**16 - 1, 2**15 - 1  # what the counts and numbers of a `InkIndex` hold
+_MOST_CELLS, _MOST_ROWS = 2**16 - 1, 2**15 - 1  # what the counts and numbers of an `InkIndex` hold
 
 
 def camera_axes(camera: Camera) -> np.ndarray:
-    """Give the camera's axes in the world, columns right, down, forward, (3, 3); it stands upright."""
+    """Return the camera's axes in the world, columns right, down, forward, (3, 3); it stands upright."""
     forward = np.array(camera.target) - np.array(camera.position)
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -34,7 +34,7 @@ def camera_axes(camera: Camera) -> np.ndarray:
 
 
 def plane_homography(camera: Camera, z: float) -> np.ndarray:
-    """Give H with (u, v, 1) ~ H (x, y, 1) for points of the world plane at height z.
+    """Compute H with (u, v, 1) ~ H (x, y, 1) for points of the world plane at height z.
 
     Args:
         camera: the camera.
@@ -50,12 +50,12 @@ def plane_homography(camera: Camera, z: float) -> np.ndarray:
 
 
 class CameraTables(NamedTuple):
-    """What drawing a mask needs to know of camera and board, computed once for both.
+    """What rendering a mask needs to know of camera and board, computed once for both.
 
     Attributes:
         pixels: row and column of the pixels that the corners of each cell fall in, each pixel once, then −1, int16
             (rows, columns, 4, 2).
-        rays: unit line of sight of each pixel, world, (size, size, 3).
+        rays: unit ray of each pixel, world, (size, size, 3).
         distance: along it to the board's plane, m, (size, size).
         position: of the camera, (3,), m.
         axes: right, down, forward as columns, (3, 3).
@@ -75,11 +75,11 @@ class CameraTables(NamedTuple):
 
 
 def camera_tables(camera: Camera, board: Whiteboard, model: mujoco.MjModel) -> CameraTables:
-    """Prepare to draw masks of a board before an arm.
+    """Prepare to render masks of a board before an arm.
 
     Args:
         camera: the camera.
-        board: gives the cells' places.
+        board: for the places of its cells.
         model: plant model; its geoms with contype 2 are the arm's.
     """
     z = board.config.centre[2]
@@ -107,7 +107,7 @@ def stack_cameras(tables: Sequence[CameraTables]) -> CameraTables:
 
 @compiled
 def camera_at(cameras, index):
-    """Give one camera's tables out of those that `stack_cameras` put side by side."""
+    """Return one camera's tables out of those that `stack_cameras` put side by side."""
     return CameraTables(
         cameras.pixels[index], cameras.rays[index], cameras.distance[index], cameras.position[index],
         cameras.axes[index], cameras.focal_px[index], cameras.shapes, cameras.sizes,
@@ -140,7 +140,7 @@ def _corner_pixels(board: Whiteboard, H: np.ndarray, size: int) -> np.ndarray:
 
 
 def _pixel_rays(camera: Camera, axes: np.ndarray) -> np.ndarray:
-    """Unit direction of sight through the middle of each pixel, world, (size, size, 3)."""
+    """Unit ray through the middle of each pixel, world, (size, size, 3)."""
     middle = (np.arange(camera.size) + 0.5 - camera.size / 2) / camera.focal_px
     u, v = np.meshgrid(middle, middle)
     rays = u[..., None] * axes[:, 0] + v[..., None] * axes[:, 1] + axes[:, 2]
@@ -156,7 +156,7 @@ def _distance_to_plane(rays: np.ndarray, position: np.ndarray, z: float) -> np.n
 
 @compiled(nogil=True)
 def render_mask(camera, cells, plant, out):
-    """Draw a mask of a board as it is: ink and dark objects 0, everything else 255.
+    """Render a mask of a board as it is: ink and dark objects 0, everything else 255.
 
     Args:
         camera: `CameraTables`.
@@ -172,7 +172,7 @@ def render_mask(camera, cells, plant, out):
 
 @compiled(nogil=True)
 def render_mask_into(camera, shown, plant, out):
-    """Draw a mask from what a `InkIndex` keeps.
+    """Render a mask from what an `InkIndex` keeps.
 
     Args:
         camera: `CameraTables`.
@@ -190,7 +190,7 @@ def render_mask_into(camera, shown, plant, out):
 
 @compiled
 def _mark(shown, out):
-    """Mark the pixels that show anything; give their rows and columns, (count, 2)."""
+    """Mark the pixels that show anything; return their rows and columns, (count, 2)."""
     size = out.shape[1]
     counts, flat = shown.reshape(-1), out.reshape(-1)
     marked = np.empty((flat.shape[0], 2), dtype=np.int16)
@@ -209,13 +209,13 @@ def _mark(shown, out):
 
 @compiled
 def _hide_behind(camera, is_box, size, centre, mat, marked, out):
-    """Unmark the marked pixels whose line of sight meets one shape before the board."""
-    eye, focal = camera.position, camera.focal_px[0]
+    """Unmark the marked pixels whose ray meets one shape before the board."""
+    viewpoint, focal = camera.position, camera.focal_px[0]
     bound = math.sqrt(size[0] ** 2 + size[1] ** 2 + size[2] ** 2) if is_box else size[0] + size[1]
     x = np.zeros(3)
     for k in range(3):
         for m in range(3):
-            x[k] += camera.axes[m, k] * (centre[m] - eye[m])
+            x[k] += camera.axes[m, k] * (centre[m] - viewpoint[m])
     n = out.shape[0]
     depth = x[2] - bound
     if depth <= 1e-3:
@@ -235,19 +235,19 @@ def _hide_behind(camera, is_box, size, centre, mat, marked, out):
             ray = (rays[row, column, 0], rays[row, column, 1], rays[row, column, 2])
             length = camera.distance[row, column]
             if is_box:
-                hit = _ray_meets_box(eye, ray, length, centre, mat, size)
+                hit = _ray_meets_box(viewpoint, ray, length, centre, mat, size)
             else:
-                hit = _ray_meets_capsule(eye, ray, length, centre, mat, size)
+                hit = _ray_meets_capsule(viewpoint, ray, length, centre, mat, size)
             if hit:
                 out[row, column] = OTHER_PIXEL
 
 
 @compiled
-def _ray_meets_capsule(eye, ray, length, centre, mat, size):
-    """Whether a line of sight passes within a capsule's radius of its axis: closest points of two segments."""
+def _ray_meets_capsule(viewpoint, ray, length, centre, mat, size):
+    """Whether a ray passes within a capsule's radius of its axis: closest points of two segments."""
     radius, half = size[0], size[1]
     ax, ay, az = mat[2], mat[5], mat[8]
-    wx, wy, wz = eye[0] - centre[0], eye[1] - centre[1], eye[2] - centre[2]
+    wx, wy, wz = viewpoint[0] - centre[0], viewpoint[1] - centre[1], viewpoint[2] - centre[2]
     b = ray[0] * ax + ray[1] * ay + ray[2] * az
     d = ray[0] * wx + ray[1] * wy + ray[2] * wz
     e = ax * wx + ay * wy + az * wz
@@ -261,14 +261,14 @@ def _ray_meets_capsule(eye, ray, length, centre, mat, size):
 
 
 @compiled
-def _ray_meets_box(eye, ray, length, centre, mat, size):
-    """Whether a line of sight enters a box: the slab test in the box's axes."""
+def _ray_meets_box(viewpoint, ray, length, centre, mat, size):
+    """Whether a ray enters a box: the slab test in the box's axes."""
     near, far = 0.0, length
     for k in range(3):
         origin = 0.0
         direction = 0.0
         for m in range(3):
-            origin += mat[3 * m + k] * (eye[m] - centre[m])
+            origin += mat[3 * m + k] * (viewpoint[m] - centre[m])
             direction += mat[3 * m + k] * ray[m]
         if abs(direction) < 1e-12:
             if abs(origin) > size[k]:

@@ -9,7 +9,7 @@ from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.drawings import Boards, check_boards
 from contactsafe.tasks.wiping.randomisation import Randomisation
 
-Sight = Literal["mask", "photograph"]
+ImageSource = Literal["mask", "photograph"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class RewardConfig:
     """Weights of the reward's terms; each is reported in `info` as `reward_<name>`.
 
     Attributes:
-        ink: for the whole of the ink, paid in shares as it is wiped off.
+        ink: for the whole of the ink, paid in proportion as it is wiped off.
         done: once, when all is gone.
         approach: per metre by which the nearest ink comes nearer, on steps that wipe nothing.
         contact: per step with the pad on the board under `force_limit_n`.
@@ -52,12 +52,12 @@ class WipingConfig(TaskConfig):
     """The wiping task; the world's fixtures and the tip's surface are the board's.
 
     Attributes:
-        clean_fraction: share of the ink below which the board counts as clean.
+        clean_fraction: fraction of the ink below which the board counts as clean.
         start_reach: the tool starts within this of the board's centre along x and y, m.
         start_height: range of the tool's height above the board at the start, m.
         boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
             first need `contactsafe[handwriting]`.
-        sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
+        image_source: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
             that changes with every episode; the latter needs `contactsafe[camera]`.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
         board: the whiteboard.
@@ -69,15 +69,15 @@ class WipingConfig(TaskConfig):
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"
-    sight: Sight = "mask"
+    image_source: ImageSource = "mask"
     randomisation: Randomisation | None = None
     board: BoardConfig = field(default_factory=BoardConfig)
     camera: Camera = field(default_factory=Camera)
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self):
-        """Refuse a kind of board or of sight that cannot be."""
+        """Refuse a kind of board or an image source that cannot be."""
         super().__post_init__()
         check_boards(self.boards)
-        if self.sight not in get_args(Sight):
-            raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")
+        if self.image_source not in get_args(ImageSource):
+            raise InvalidInputError(f"image_source = {self.image_source!r}; choose mask or photograph")

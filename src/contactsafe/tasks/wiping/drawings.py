@@ -45,7 +45,7 @@ def paint_board(board: Whiteboard, kind: str, rng: np.random.Generator) -> None:
 
 
 def _page(kind: str, rng: np.random.Generator) -> np.ndarray:
-    """Write one to three lines by one hand: points along the pen's way, (k, 2), in heights of a capital."""
+    """Write one to three lines by one hand: points along the pen's path, (k, 2), in heights of a capital."""
     font = FONTS[rng.integers(len(FONTS))]
     lines = []
     for k in range(rng.integers(1, 4)):

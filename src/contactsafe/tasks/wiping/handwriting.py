@@ -1,7 +1,7 @@
-"""What a pen has written: rows of people's digits, words in single-stroke fonts, as points along its way.
+"""What a pen has written: rows of people's digits, words in single-stroke fonts, as points along its path.
 
 Digits are 1797 that thirteen people wrote, 8 × 8 grey pixels each (the test set of UCI's "Optical Recognition of
-Handwritten Digits", Alpaydin & Kaynak 1998, as scikit-learn holds it); the way of the pen is found and drawn anew.
+Handwritten Digits", Alpaydin & Kaynak 1998, as scikit-learn holds it); the path of the pen is found and painted anew.
 Words are set in Hershey's fonts (1967), each letter a little off in size, place and slope, and wavering as a hand does.
 """
 
@@ -35,7 +35,7 @@ def write_digits(count: int, rng: np.random.Generator) -> np.ndarray:
         rng: chooses digits, hands and places.
 
     Returns:
-        Points along the pen's way, (k, 2): down and to the right, in heights of a digit; the line runs to the right.
+        Points along the pen's path, (k, 2): down and to the right, in heights of a digit; the line runs to the right.
 
     Raises:
         InvalidInputError: scikit-learn is not installed.
@@ -57,7 +57,7 @@ def write_words(text: str, font: str, rng: np.random.Generator) -> np.ndarray:
         rng: moves, scales and turns each letter.
 
     Returns:
-        Points along the pen's way, (k, 2): down and to the right, in heights of a capital; the line runs to the right.
+        Points along the pen's path, (k, 2): down and to the right, in heights of a capital; the line runs to the right.
 
     Raises:
         InvalidInputError: Hershey-Fonts is not installed.
@@ -75,7 +75,7 @@ def write_words(text: str, font: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def _along(corners: np.ndarray) -> np.ndarray:
-    """Give points close to each other along a polyline, (k, 2)."""
+    """Return points close to each other along a polyline, (k, 2)."""
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / _STEP))
     return np.column_stack([np.interp(at, lengths, corners[:, k]) for k in (0, 1)])
@@ -93,7 +93,7 @@ def _wavering(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 @functools.cache
 def _middle_line(index: int) -> np.ndarray:
-    """Find the way of the pen that left a grey 8 × 8 digit, (k, 2), from its top and left, in its heights."""
+    """Find the path of the pen that left a grey 8 × 8 digit, (k, 2), from its top and left, in its heights."""
     images = _digit_images()
     from scipy import ndimage
 

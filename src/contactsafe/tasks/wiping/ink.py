@@ -29,7 +29,7 @@ class InkIndex(NamedTuple):
 
 
 def empty_ink_index(n: int, cells: int, size: int) -> InkIndex:
-    """Make a `InkIndex` of n clean boards of so many cells, seen by cameras of size × size pixels."""
+    """Make an `InkIndex` of n clean boards of so many cells, seen by cameras of size × size pixels."""
     return InkIndex(
         cells=np.zeros((n, cells, 2), dtype=np.int16),
         entries=np.zeros(n, dtype=np.int64),
@@ -68,7 +68,7 @@ def remove_erased(ink_index, i, cells, pixels):
 
 @compiled
 def list_cells(cells, out):
-    """Write row and column of each cell that is not clean to `out`, (rows · columns, 2); give their number."""
+    """Write row and column of each cell that is not clean to `out`, (rows · columns, 2); return their number."""
     columns = cells.shape[1]
     numbers = np.empty(cells.size, dtype=np.int32)
     count = places_unlike(cells.reshape(-1), np.uint8(CLEAN), numbers)

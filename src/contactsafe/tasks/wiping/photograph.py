@@ -26,7 +26,7 @@ INKS = {
 """Reflectance of whiteboard pens in red, green and blue."""
 
 _BOARD, _TABLE, _OBJECT = (0.90, 0.91, 0.90), (0.55, 0.47, 0.38), 0.12  # reflectances
-_ROUNDNESS = ((1.0, 0.6), (0.7, 0.8))  # share of a capsule's radius, and its brightness within
+_ROUNDNESS = ((1.0, 0.6), (0.7, 0.8))  # fraction of a capsule's radius, and its brightness within
 _TO_MIDDLES = np.array([[1, 0, -0.5], [0, 1, -0.5], [0, 0, 1]])  # OpenCV counts from the middle of a pixel
 _NOISE_SIGMA, _SPARE = 25.0, 64  # of the grain as stored about 128; pixels by which it is larger than a picture
 
@@ -37,22 +37,22 @@ class Conditions:
 
     Attributes:
         ink: name of the pen.
-        opacity: of the most faded ink, share; elsewhere up to 1.
-        exposure: brightness of the board in full light, share of the sensor's range.
+        opacity: of the most faded ink, fraction; elsewhere up to 1.
+        exposure: brightness of the board in full light, fraction of the sensor's range.
         tint: of the light in red, green and blue.
-        gradient: change of brightness across the picture to the right and down, share.
-        vignette: brightness lost in the corners, share.
-        edge_depth: share of the light that is missing beyond a shadow's edge.
+        gradient: change of brightness across the picture to the right and down, fraction.
+        vignette: brightness lost in the corners, fraction.
+        edge_depth: fraction of the light that is missing beyond a shadow's edge.
         edge_angle: of that edge, rad.
-        edge_offset: of that edge from the picture's middle, share of its width.
-        edge_soft: width of its fall, share of the picture's width.
+        edge_offset: of that edge from the picture's middle, fraction of its width.
+        edge_soft: width of its fall, fraction of the picture's width.
         lamp: place of the lamp that casts the arm's shadow, world, m.
-        arm_depth: share of the light that is missing in the arm's shadow.
+        arm_depth: fraction of the light that is missing in the arm's shadow.
         arm_soft: blur of that shadow, pixels.
-        glare: brightness added in the middle of a reflection, share of the sensor's range.
-        glare_place: column and row of it, shares of the picture's width.
-        glare_size: radius of it, share of the picture's width.
-        smudge: how much darker the dirtiest place of the board is, share.
+        glare: brightness added in the middle of a reflection, fraction of the sensor's range.
+        glare_place: column and row of it, fractions of the picture's width.
+        glare_size: radius of it, fraction of the picture's width.
+        smudge: how much darker the dirtiest place of the board is, fraction.
         blur: of the lens, standard deviation, pixels.
         noise: of a grey level in full light, standard deviation, levels of 255.
         shift: of the picture against the calibration, columns and rows, pixels.
@@ -85,7 +85,7 @@ def sample_conditions(rng: np.random.Generator, severity: float | None = None) -
 
     Args:
         rng: draws them.
-        severity: from 0, an evenly lit board, to 1, a lamp on one side and hard shadows; drawn where None.
+        severity: from 0, an evenly lit board, to 1, a lamp on one side and sharp shadows; sampled where None.
     """
     s = rng.uniform() if severity is None else severity
     return Conditions(
@@ -114,13 +114,13 @@ def sample_conditions(rng: np.random.Generator, severity: float | None = None) -
 
 @dataclass
 class _Scene:
-    """What stays the same from picture to picture, uint8; a share of 1 is 255."""
+    """What stays the same from picture to picture, uint8; a fraction of 1 is 255."""
 
     seed: int
     conditions: Conditions
     homography: np.ndarray  # as it is, not as it was calibrated
     blank: np.ndarray  # the lit board and table without ink, (n, n, 3)
-    opacity: np.ndarray  # of the ink, (n, n), share
+    opacity: np.ndarray  # of the ink, (n, n), fraction
     glare: np.ndarray  # levels added, (n, n, 3)
 
 
@@ -169,17 +169,17 @@ class Photographer(Independent):
         self._posed = mujoco.MjData(self._model)
 
     def solids(self, data: mujoco.MjData) -> Solids:
-        """Give the arm's shapes where they are."""
+        """Return the arm's shapes where they are."""
         return Solids(self._is_box, self._sizes, data.geom_xpos[self._arm], data.geom_xmat[self._arm].reshape(-1, 3, 3))
 
     def solids_at(self, q: np.ndarray) -> Solids:
-        """Give the arm's shapes where joint positions q (n,), rad, say that they are."""
+        """Return the arm's shapes where joint positions q (n,), rad, say that they are."""
         self._posed.qpos[: len(q)] = q
         mujoco.mj_kinematics(self._model, self._posed)
         return self.solids(self._posed)
 
     def hidden(self, solids: Solids) -> np.ndarray:
-        """Give what kinematics know of the picture: 255 where the arm stands, uint8 (n, n)."""
+        """Return what kinematics know of the picture: 255 where the arm stands, uint8 (n, n)."""
         return silhouette(solids, self._eye, self._projection, PHOTO_PX)
 
     def take(self, cells: np.ndarray, solids: Solids, seed: int, number: int) -> np.ndarray:
@@ -246,13 +246,13 @@ class Photographer(Independent):
         return cv2.addWeighted(picture, 1.0, grain, strength, -128 * strength)
 
     def _cover(self, scene: _Scene, where: np.ndarray) -> np.ndarray:
-        """Share of each pixel that something on the board covers, (n, n) uint8."""
+        """Fraction of each pixel that something on the board covers, (n, n) uint8."""
         H = _TO_MIDDLES @ scene.homography @ self._cells_to_board
         covered = np.where(where, np.uint8(255), np.uint8(0))
         return cv2.warpPerspective(covered, H, (PHOTO_PX, PHOTO_PX), flags=cv2.INTER_LINEAR)
 
     def _shadow(self, scene: _Scene, solids: Solids) -> np.ndarray:
-        """Share of the light that the arm takes away, (n, n) uint8; drawn coarsely, for it is soft."""
+        """Fraction of the light that the arm takes away, (n, n) uint8; drawn coarsely, for it is soft."""
         c = scene.conditions
         coarse = 5
         dark = np.zeros((PHOTO_PX // coarse,) * 2, np.uint8)
@@ -277,9 +277,9 @@ class Photographer(Independent):
 
 
 def _darkened(picture: np.ndarray, cover: np.ndarray, reflectance) -> np.ndarray:
-    """Cover a picture, (n, n, 3), with something that reflects these shares of red, green and blue."""
+    """Cover a picture, (n, n, 3), with something that reflects these fractions of red, green and blue."""
     levels = np.arange(256)
-    passed = [cv2.LUT(cover, np.round(255 - levels * (1 - share)).astype(np.uint8)) for share in reflectance]
+    passed = [cv2.LUT(cover, np.round(255 - levels * (1 - fraction)).astype(np.uint8)) for fraction in reflectance]
     return cv2.multiply(picture, cv2.merge(passed), scale=1 / 255)
 
 

@@ -1,4 +1,4 @@
-"""The policies' masks by way of photographs: taken of every world, and segmented as a real camera's are."""
+"""The policies' masks from photographs: taken of every world, and segmented as a real camera's are."""
 
 import numpy as np
 

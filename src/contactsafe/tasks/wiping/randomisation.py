@@ -1,4 +1,4 @@
-"""What differs from episode to episode: a table not quite where it was, another pad, a camera that was knocked.
+"""What differs from episode to episode: height and tilt of the table, pad, camera, plant.
 
 A policy that has met all of this carries over to a robot that nobody tuned for it. What is drawn goes into the plant
 and into what the camera sees; controller and policy are never told.
@@ -24,10 +24,10 @@ class Randomisation:
         pad_size: edges of the pad, as a multiple of the tool's; both alike.
         camera_m: along x, y and z, by which the camera is not where its calibration says, m.
         camera_rad: about its three axes, likewise, rad.
-        ink_missed: share of ink pixels that segmentation misses, anew in every picture.
+        ink_missed: fraction of ink pixels that segmentation misses, anew in every picture.
         ink_invented: pixels of every picture that it takes for ink.
         delay_steps: policy steps by which the picture is late; whole.
-        payload_kg: at the tool, unknown to the controller, kg.
+        payload_kg: at the tool, of which the controller knows nothing, kg.
         joint_friction: as a multiple of the plant's.
         inertia: masses and inertias of the links, as a multiple of the plant's.
         torque_delay_ticks: ticks between command and effect, 0 or 1.
@@ -60,7 +60,7 @@ class Randomisation:
 
     @classmethod
     def broad(cls) -> "Randomisation":
-        """Give the ranges that the shipped policy is trained with."""
+        """Return the ranges that the shipped policy is trained with."""
         return cls(
             board_height_m=(-0.005, 0.005),
             board_tilt_rad=(-0.012, 0.012),

@@ -12,8 +12,8 @@ from contactsafe.tasks.wiping.tasks import WipingTasks
 from contactsafe.tasks.wiping.whiteboard import INK, erase_under_pad
 
 _RAISED = 0.35  # m above the board: the arm is out of the camera's view of it
-_SHARE_RAISED = 0.1
-_SHARE_BLANK = 0.2  # of the boards that were wiped clean: the rest are drawn anew
+_FRACTION_RAISED = 0.1
+_FRACTION_BLANK = 0.2  # of the boards that were wiped clean: the rest are drawn anew
 
 
 class MaskSampler(Independent):
@@ -64,20 +64,20 @@ class MaskSampler(Independent):
             board.clear()
             paint_board(board, self._tasks.config.boards, rng)
             self._wipe(rng, left=rng.uniform())
-            if board.ink_cells > 0 or rng.uniform() < _SHARE_BLANK:
+            if board.ink_cells > 0 or rng.uniform() < _FRACTION_BLANK:
                 return
 
     def _place_tool(self, rng: np.random.Generator) -> np.ndarray:
         tasks = self._tasks
         board = tasks.config.board
         reach = board.ink_size / 2 + 0.05
-        height = _RAISED if rng.uniform() < _SHARE_RAISED else 0.08 * rng.uniform() ** 2
+        height = _RAISED if rng.uniform() < _FRACTION_RAISED else 0.08 * rng.uniform() ** 2
         tool = np.add(board.centre, [*rng.uniform(-reach, reach, 2), height])
         tasks.worlds.place(0, tasks.posture_over(Pose(tool, DOWN)))
         return tool
 
     def _wipe(self, rng: np.random.Generator, left: float) -> None:
-        """Put the pad down on ink, at random, until this share of the ink is left."""
+        """Put the pad down on ink, at random, until this fraction of the ink is left."""
         cells, board = self._tasks.boards.cells[0], self._tasks.boards.boards[0]
         start = board.ink_cells
         while board.ink_cells > left * start:

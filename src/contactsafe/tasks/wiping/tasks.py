@@ -73,7 +73,7 @@ class WipingTasks(Tasks):
 
     def _photograph_source(self) -> Any:
         """Make what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
-        if self.config.sight == "mask":
+        if self.config.image_source == "mask":
             return None
         from contactsafe.tasks.wiping.photographs import PhotographSource
 
@@ -167,7 +167,7 @@ class WipingTasks(Tasks):
 
     def sort(self) -> tuple[Any, ...]:
         """Return what decides which code a step compiles."""
-        return (*super().sort(), self.config.sight, self.config.randomisation is not None)
+        return (*super().sort(), self.config.image_source, self.config.randomisation is not None)
 
     def scratch(self) -> "WipingTasks":
         """Make one task alike to warm up with; its board needs no fonts."""

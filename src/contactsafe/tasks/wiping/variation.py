@@ -109,20 +109,17 @@ def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) 
     """Draw where a camera really stands and looks; turning it moves what it looks at."""
     moved, turned = rng.uniform(*ranges.camera_m, 3), rng.uniform(*ranges.camera_rad, 3)
     position = np.array(camera.position) + moved
-    sight = np.array(camera.target) + moved - position
-    sight = sight + np.cross(turned, sight)
-    return replace(camera, position=tuple(position.tolist()), target=tuple((position + sight).tolist()))
+    axis = np.array(camera.target) + moved - position
+    axis = axis + np.cross(turned, axis)
+    return replace(camera, position=tuple(position.tolist()), target=tuple((position + axis).tolist()))
 
 
 class _Plant:
     """One world's plant as it was built, from which every draw starts."""
 
     def __init__(self, worlds: Worlds, boards: Whiteboards, i: int):
-        self._worlds, self._boards, self._i = (
-            worlds,
-            boards,
-            i,
-        )  # not the record itself, which a copy of this would share with nobody
+        # Not the records themselves: a copy of this would keep the old ones.
+        self._worlds, self._boards, self._i = worlds, boards, i
         model, errors = worlds.models[i], worlds.records[i]["errors"]
         self._friction, self._pad_half = errors["friction"].copy(), boards.records[i]["pad_half"].copy()
         self._delay = int(errors["delay_ticks"])
