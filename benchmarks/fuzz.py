@@ -279,7 +279,7 @@ def checkpoints(seed: int, items: range):
     from contactsafe.learning.algorithms import PpoConfig, SacConfig
     from contactsafe.learning.checkpoints import CHECKPOINT, load_checkpoint, pack, save_checkpoint, unpack
     from contactsafe.learning.run import Run, load_run
-    from contactsafe.learning.train_policy import _encoded, _Eyes
+    from contactsafe.learning.train_policy import _encoded, _Encoder
     from contactsafe.learning.train_vae import VaeConfig, train_vae
     from contactsafe.sim.randomisation import Randomisation
     from contactsafe.tasks.base.pushes import Pushes
@@ -295,18 +295,18 @@ def checkpoints(seed: int, items: range):
 
     def set_up(kind, **more):
         config = kind(
-            vae=place / "vae", out=place / kind.algorithm, num_envs=2, rollout_steps=8, batch=8, net=(8, 8), **more
+            encoder=place / "vae", out=place / kind.algorithm, num_envs=2, rollout_steps=8, batch=8, net=(8, 8), **more
         )
         config.out.mkdir()
-        env = _encoded(make_env(), eyes, config)
+        env = _encoded(make_env(), encoder, config)
         model = config.make_model(env)
-        run = Run(config, model, env, eyes.digest)
+        run = Run(config, model, env, encoder.digest)
         model.learn(24, log_interval=None)
         run.save(1.0)
         return config, run, load_checkpoint(config.out), (config.out / "replay.bin")
 
     def go_on(config, run):
-        run.restore(load_run(config, eyes.digest))
+        run.load_state_dict(load_run(config, encoder.digest))
         for _ in range(3):
             run.env.step(np.zeros((2, 18), np.float32))
         run.model.learn(8, log_interval=None, reset_num_timesteps=False)
@@ -315,7 +315,7 @@ def checkpoints(seed: int, items: range):
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         train_vae(VaeConfig(out=place / "vae", held_out=16), sample_masks, HOMOGRAPHY)
-        eyes = _Eyes.load(place / "vae")
+        encoder = _Encoder.load(place / "vae")
         runs = [
             set_up(PpoConfig, epochs=1),
             set_up(SacConfig, buffer=64, learning_starts=4, update_every=2, gradient_steps=1, action_repeat=1),

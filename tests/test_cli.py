@@ -21,8 +21,8 @@ from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.sim.drawings import BOARDS
 from contactsafe.tasks import ENGINES
 from contactsafe.tasks.base.evaluation import FIGURES
-from contactsafe.tasks.wiping.config import Sight
-from contactsafe.tasks.wiping.scripted import REFERENCES
+from contactsafe.tasks.wiping.config import ImageSource
+from contactsafe.tasks.wiping.scripted import SCRIPTED
 
 UNKNOWN = "--{}: 'best' is unknown; choose from vices, paper, safe; see contactsafe {} --help"
 
@@ -68,7 +68,7 @@ def test_training_has_help_of_its_own(kind, capsys):
     out = capsys.readouterr().out
     assert "--resume" in out
     chosen = (
-        ["{foveated,tool,paper}"] if kind == "vae" else [f"{{{','.join(ENGINES.values())}}}", "{pose,target,force}"]
+        ["{log_polar,tool,paper}"] if kind == "vae" else [f"{{{','.join(ENGINES.values())}}}", "{pose,target,force}"]
     )
     assert all(names in out for names in chosen)
     assert not re.search(r"\bSTR\b|None", out)
@@ -84,9 +84,9 @@ def test_training_has_help_of_its_own(kind, capsys):
             {
                 "--controller": presets.PRESETS,
                 "--boards": BOARDS,
-                "--sight": get_args(Sight),
+                "--image-source": get_args(ImageSource),
                 "--engine": ENGINES,
-                "--reference": REFERENCES,
+                "--scripted": SCRIPTED,
             },
         ),
         ("bench", {}),
@@ -170,17 +170,16 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
             "see contactsafe evaluate --help",
         ),
         (
-            "evaluate --sight dream",
-            "--sight: 'dream' is unknown; choose from mask, photograph; see contactsafe evaluate --help",
+            "evaluate --image-source dream",
+            "--image-source: 'dream' is unknown; choose from mask, photograph; see contactsafe evaluate --help",
         ),
         (
             "evaluate --engine steam",
             "--engine: 'steam' is unknown; choose from mujoco, pybullet; see contactsafe evaluate --help",
         ),
         (
-            "evaluate --reference oracle",
-            "--reference: 'oracle' is unknown; choose from raster, nearest-ink, random; "
-            "see contactsafe evaluate --help",
+            "evaluate --scripted oracle",
+            "--scripted: 'oracle' is unknown; choose from raster, nearest-ink, random; see contactsafe evaluate --help",
         ),
         ("evaluate --seed", "--seed: its value is missing; see contactsafe evaluate --help"),
     ],
@@ -259,9 +258,9 @@ def test_a_damaged_bundle_is_told_and_nothing_is_written(bundle, tmp_path, capsy
     assert not (tmp_path / "out").exists()
 
 
-def test_a_bundle_and_a_reference_are_one_too_many(bundle, capsys):
-    told = mistake(capsys, "evaluate", str(bundle), "--reference", "raster")
-    assert told == "a bundle and --reference raster are both given; name one"
+def test_a_bundle_and_a_scripted_policy_are_one_too_many(bundle, capsys):
+    told = mistake(capsys, "evaluate", str(bundle), "--scripted", "raster")
+    assert told == "a bundle and --scripted raster are both given; name one"
 
 
 def test_a_bundle_that_is_not_whole_is_told(bundle, capsys):
@@ -281,10 +280,11 @@ def test_a_run_without_a_bundle_is_told_how_to_leave_one(named, tmp_path, capsys
     )
 
 
-def test_eyes_in_place_of_a_policy_are_told(tmp_path, capsys):
-    (tmp_path / "vae.json").write_text("{}")
+def test_an_encoder_in_place_of_a_policy_is_told(tmp_path, capsys):
+    (tmp_path / "encoder.json").write_text("{}")
     assert mistake(capsys, "evaluate", str(tmp_path)) == (
-        f"{tmp_path} holds eyes, not a policy; run `contactsafe train ppo --vae {tmp_path}`, which leaves a bundle"
+        f"{tmp_path} holds a vision encoder, not a policy; "
+        f"run `contactsafe train ppo --encoder {tmp_path}`, which leaves a bundle"
     )
 
 

@@ -25,8 +25,8 @@ from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.policy.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
 from contactsafe.sim.drawings import Boards
 from contactsafe.tasks import ENGINES
-from contactsafe.tasks.wiping.config import Sight, WipingConfig
-from contactsafe.tasks.wiping.scripted import REFERENCES
+from contactsafe.tasks.wiping.config import ImageSource, WipingConfig
+from contactsafe.tasks.wiping.scripted import SCRIPTED
 
 _COMPILES = "the first run compiles for a minute or two"
 
@@ -129,13 +129,11 @@ def evaluate(
     seed: int = 0,
     controller: Controller = WipingConfig.controller,
     boards: Boards = WipingConfig.boards,
-    sight: Sight = WipingConfig.sight,
+    image_source: ImageSource = WipingConfig.image_source,
     engine: Annotated[str, one_of(ENGINES)] = "mujoco",
     pushed: bool = False,
     randomised: bool = False,
-    reference: Annotated[
-        str | None, one_of(REFERENCES), tyro.conf.arg(help_behavior_hint="(default: the policy)")
-    ] = None,
+    scripted: Annotated[str | None, one_of(SCRIPTED), tyro.conf.arg(help_behavior_hint="(default: the policy)")] = None,
     json: bool = False,
 ) -> None:
     """Let a policy wipe boards it has never seen.
@@ -148,11 +146,11 @@ def evaluate(
         seed: of boards, starts and noise.
         controller: preset underneath.
         boards: what is drawn on them; all but strokes need contactsafe[handwriting].
-        sight: the ink as it is (mask), or as segmentation finds it in photographs (photograph).
+        image_source: the ink as it is (mask), or as segmentation finds it in photographs (photograph).
         engine: what computes the physics.
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
         randomised: every board another height, tilt, pad, camera and plant, as in training.
-        reference: a script in place of the policy.
+        scripted: a scripted policy in place of the policy.
         json: print JSON instead of a table.
     """
     from contactsafe.policy.policy import Policy
@@ -160,19 +158,19 @@ def evaluate(
     from contactsafe.tasks import make_engine
     from contactsafe.tasks.base.evaluation import FIGURES, HELD_OUT_SEED, evaluate_policy
     from contactsafe.tasks.base.pushes import Pushes
-    from contactsafe.tasks.wiping import scripted as references
+    from contactsafe.tasks.wiping.scripted import scripted_policy
 
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
     if seed < 0:
         raise InvalidInputError(f"seed = {seed}; give 0 or more")
-    if reference is not None and bundle is not None:
-        raise InvalidInputError(f"a bundle and --reference {reference} are both given; name one")
-    loaded = None if reference else Bundle.load(bundle or shipped_bundle())
+    if scripted is not None and bundle is not None:
+        raise InvalidInputError(f"a bundle and --scripted {scripted} are both given; name one")
+    loaded = None if scripted else Bundle.load(bundle or shipped_bundle())
     config = WipingConfig(
         controller=controller,
         boards=boards,
-        sight=sight,
+        image_source=image_source,
         pushes=Pushes() if pushed else None,
         randomisation=Randomisation.broad() if randomised else None,
     )
@@ -180,15 +178,21 @@ def evaluate(
     most = 16 if engine == "mujoco" else 2
     env = make_engine(engine, max(n for n in range(1, most + 1) if episodes % n == 0), config)
     if loaded is None:
-        policy = references.reference(str(reference), config, env, seed)
+        policy = scripted_policy(str(scripted), config, env, seed)
     else:
         policy = Policy(loaded, env.camera_homography)
     with _bar("boards", episodes) as bar:
         results = evaluate_policy(policy, env, episodes, HELD_OUT_SEED + seed, on_episode=lambda record: bar.update())
     env.close()
     records = results.pop("records")
-    task = {"boards": boards, "sight": sight, "engine": engine, "pushed": pushed, "randomised": randomised}
-    asked = {"policy": reference or str(bundle or "shipped"), "seed": seed, "controller": controller, "task": task}
+    task = {
+        "boards": boards,
+        "image_source": image_source,
+        "engine": engine,
+        "pushed": pushed,
+        "randomised": randomised,
+    }
+    asked = {"policy": scripted or str(bundle or "shipped"), "seed": seed, "controller": controller, "task": task}
     if json:
         print(to_json({**results, **asked, "boards": records}))
         return
@@ -242,11 +246,11 @@ def warmup(joints: Joints = ("6", "7")) -> None:
 
 
 def train(arguments: Sequence[str]) -> None:
-    """Prepare the eyes (vae) or train a policy (ppo, sac)."""
+    """Prepare the vision encoder (vae) or train a policy (ppo, sac)."""
     if not arguments or arguments[0] in ("-h", "--help"):
         print(
             "usage: contactsafe train {vae,ppo,sac} [options]\n\n"
-            "  vae  the eyes: foveated ones, which need no training, or a β-VAE;\n"
+            "  vae  the vision encoder: log-polar features, which need no training, or a β-VAE;\n"
             "       writes runs/vae\n"
             "  ppo  a policy on what it feels and sees; reads runs/vae,\n"
             "       writes runs/ppo and runs/ppo/bundle\n"
@@ -289,7 +293,7 @@ def _train_vae(arguments: list[str]) -> None:
     report = train_vae(config, sampler.sample, sampler.homography)
     shown = ("representation", "active_latents", "reconstruction", "nearest_ink")
     print(to_json({name: report[name] for name in shown if name in report}))
-    print(f"eyes: {config.out}; next: contactsafe train ppo --vae {config.out}")
+    print(f"encoder: {config.out}; next: contactsafe train ppo --encoder {config.out}")
 
 
 def _train_policy(algorithm: str, arguments: list[str]) -> None:

@@ -45,7 +45,7 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
         "wiping, randomised": partial(_wipe, ENGINES["mujoco"], WipingConfig(randomisation=Randomisation.broad())),
         **({"photographs": _photograph} if importlib.util.find_spec("cv2") else {}),
         **({"wiping in PyBullet": _wipe_in_bullet} if importlib.util.find_spec("pybullet") else {}),
-        "policy and eyes": _see,
+        "policy and encoder": _see,
     }
 
 
@@ -74,7 +74,7 @@ def _wipe(task: str, config: WipingConfig) -> None:
 
 
 def _photograph() -> None:
-    _wipe(ENGINES["mujoco"], WipingConfig(sight="photograph"))
+    _wipe(ENGINES["mujoco"], WipingConfig(image_source="photograph"))
 
 
 def _wipe_in_bullet() -> None:

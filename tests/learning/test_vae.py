@@ -136,7 +136,7 @@ def _stop_at(state, epochs, error):
 
 def test_exported_encoder_is_the_trained_one(tmp_path):
     report = train_vae(tiny_config(tmp_path / "run", epochs=1), sample_masks, H)
-    assert json.loads((tmp_path / "run" / "vae.json").read_text())["latent_mean"] == report["latent_mean"]
+    assert json.loads((tmp_path / "run" / "encoder.json").read_text())["latent_mean"] == report["latent_mean"]
     vae = VAE(TINY)
     vae.load_state_dict(load_checkpoint(tmp_path / "run")["model"])
     data = make_dataset(sample_masks, H, 6, 3, "tool", 0.64, 32)
@@ -177,7 +177,7 @@ def test_runs_are_not_mixed_up(tmp_path):
 def test_perception_refuses_an_unknown_representation_and_a_wrong_mask():
     with pytest.raises(InvalidInputError) as error:
         Perception(None, "world", 0.64, 128, H)
-    assert str(error.value) == "representation is 'world'; choose one of foveated, tool, paper"
+    assert str(error.value) == "representation is 'world'; choose one of log_polar, tool, paper"
     with pytest.raises(InvalidInputError) as error:
         Perception(None, "paper", 0.64, 128, H)(np.zeros((1, 64, 64), np.uint8), BOARD[None])
     assert str(error.value) == "masks are uint8 of shape (1, 64, 64); this encoder takes uint8 (N, 128, 128)"

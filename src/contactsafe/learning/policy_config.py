@@ -11,7 +11,7 @@ from contactsafe.policy.observation import SCALES
 from contactsafe.tasks import ENGINES
 
 SESSION_FIELDS = (
-    "vae",
+    "encoder",
     "out",
     "resume",
     "total_steps",
@@ -31,7 +31,8 @@ class PolicyConfig:
     `PpoConfig`.
 
     Attributes:
-        vae: folder of the eyes, as `contactsafe train vae` leaves them (vae.json; encoder.onnx where it is learned).
+        encoder: folder of the vision encoder that `contactsafe train vae` leaves (encoder.json, and encoder.onnx where it is
+            learned).
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         env_id: Gymnasium id of the task; from Python, any that gives the same observations.
@@ -46,7 +47,7 @@ class PolicyConfig:
         discount: the paper's γ of RL, for one environment step; raised to action_repeat.
         net: widths of the hidden layers, of policy and of value network.
         action_repeat: environment steps for which one action is given.
-        scan: amplitude of the steady motion laid over the actions, in training and ever after; 0 for none.
+        dither: amplitude of the steady motion laid over the actions, in training and ever after; 0 for none.
         reward_scale: rewards are multiplied by this before learning; logs are not.
         observes: what the policy takes besides the picture: pose (the paper's), target (x_d, K1 and D1 as they are
             now) and force; without the latter two it can neither know how stiff it is nor feel what it touches.
@@ -59,7 +60,7 @@ class PolicyConfig:
 
     algorithm: ClassVar[str]
 
-    vae: Path = Path("runs/vae")
+    encoder: Path = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
     env_id: Annotated[str, one_of(ENGINES.values())] = "contactsafe/Wiping-v0"
@@ -73,7 +74,7 @@ class PolicyConfig:
     discount: float = 0.995
     net: tuple[int, ...] = (256, 128)
     action_repeat: int = 1
-    scan: float = 0.3
+    dither: float = 0.3
     reward_scale: float = 1.0
     observes: Annotated[tuple[str, ...], some_of(SCALES, " ")] = ("pose", "target", "force")
     rate_hz: float = 60.0

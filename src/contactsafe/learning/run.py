@@ -10,6 +10,7 @@ from stable_baselines3.common.save_util import recursive_getattr
 
 from contactsafe.core.copying import OfTraining
 from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.core.state import generator_state
 from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, part, whole
 from contactsafe.learning.checkpoints import (
     check_random_state,
@@ -26,9 +27,8 @@ from contactsafe.learning.checkpoints import (
 )
 from contactsafe.learning.policy_config import SESSION_FIELDS
 from contactsafe.learning.replay import ReplayFile
-from contactsafe.sim.snapshot import generator_state
 
-FORMAT = 4
+FORMAT = 5
 """Version of the checkpoint's layout."""
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
@@ -42,7 +42,7 @@ def load_run(config, encoder_digest):
         encoder_digest: SHA-256 of the encoder it would go on with.
 
     Returns:
-        The state for `Run.restore`.
+        The state for `Run.load_state_dict`.
 
     Raises:
         InvalidInputError: it cannot be read, or is of another version, algorithm, encoder, or of other settings.
@@ -61,8 +61,8 @@ def load_run(config, encoder_digest):
         check_same_config(settings, config, SESSION_FIELDS)
     if encoder != encoder_digest:
         raise InvalidInputError(
-            f"the encoder in {config.vae} is not the one that the run in {config.out} was started with; "
-            "give that one's folder as --vae, or start anew with another --out"
+            f"the encoder in {config.encoder} is not the one that the run in {config.out} was started with; "
+            "give that one's folder as --encoder, or start anew with another --out"
         )
     return state
 
@@ -115,7 +115,7 @@ class Run(OfTraining):
             "replay_rows": self.replay.save() if self.replay else 0,
             "env": pack(
                 {
-                    "below": self.env.snapshot(),
+                    "below": self.env.state_dict(),
                     "observation": model._last_obs,
                     "starts": model._last_episode_starts,
                 }
@@ -124,8 +124,8 @@ class Run(OfTraining):
         save_checkpoint(self.config.out, state)
         self.saved_steps = model.num_timesteps
 
-    def restore(self, state):
-        """Put model and environment back to where a checkpoint left them; give the minutes it had trained.
+    def load_state_dict(self, state):
+        """Load model and environment from a checkpoint and return the minutes it had trained.
 
         Raises:
             InvalidInputError: the run was started on another task, such as one with another reward, or the checkpoint
@@ -145,7 +145,7 @@ class Run(OfTraining):
         model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
         model.ep_success_buffer = deque(state["successes"], maxlen=model._stats_window_size)
         model.action_space.np_random.bit_generator.state = state["random_actions"]
-        self.env.restore(env["below"])
+        self.env.load_state_dict(env["below"])
         if self.env.keeps_worlds:
             model._last_obs, model._last_episode_starts = env["observation"], env["starts"]
         else:

@@ -23,11 +23,11 @@ from contactsafe.policy.bundle import (
     digest,
     read_bounded,
 )
-from contactsafe.policy.dither import Scan
+from contactsafe.policy.dither import Dither
 from contactsafe.policy.graph import check_ports, read_graph
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import (
-    EYES_FORMAT,
+    ENCODER_FORMAT,
     LEARNED,
     REPRESENTATIONS,
     Perception,
@@ -42,7 +42,7 @@ def train_policy(config, make_env=None, make_held_out=None):
     """Train, export a bundle, and evaluate it on held-out boards.
 
     Killed at any moment and resumed, a run ends with the same weights as one that was left alone: on one machine, with
-    the same versions, as many threads, and an environment that has `snapshot` and `restore`.
+    the same versions, as many threads, and an environment that has `state_dict` and `load_state_dict`.
 
     Args:
         config: a PolicyConfig of some algorithm, such as PpoConfig.
@@ -53,43 +53,43 @@ def train_policy(config, make_env=None, make_held_out=None):
         The results written into the bundle, a dict.
 
     Raises:
-        InvalidInputError: no encoder in config.vae, nothing to resume, or the run was started otherwise.
+        InvalidInputError: no encoder in config.encoder, nothing to resume, or the run was started otherwise.
         OutputError: out cannot be written, or holds another run.
     """
-    eyes = _Eyes.load(config.vae)
+    encoder = _Encoder.load(config.encoder)
     make_env = make_env or (lambda num_envs: gymnasium.make_vec(config.env_id, num_envs=num_envs))
     with run_folder(config.out, config.resume) as out:
-        return _train(config, eyes, make_env, make_held_out or make_env, out)
+        return _train(config, encoder, make_env, make_held_out or make_env, out)
 
 
-def _train(config, eyes, make_env, make_held_out, out):
-    state = load_run(config, eyes.digest) if config.resume else None
+def _train(config, encoder, make_env, make_held_out, out):
+    state = load_run(config, encoder.digest) if config.resume else None
     torch.set_num_threads(config.threads)
-    env = _encoded(make_env(config.num_envs), eyes, config)
+    env = _encoded(make_env(config.num_envs), encoder, config)
     try:
-        model, effort = _learn(config, env, eyes, state)
+        model, effort = _learn(config, env, encoder, state)
     finally:
         env.close()
-    layers, description = config.actor(model), _describe(config, eyes, effort)
-    folder = export_bundle(out / FOLDER, eyes.encoder, layers, env.scaling, description, force=True)
+    layers, description = config.actor(model), _describe(config, encoder, effort)
+    folder = export_bundle(out / FOLDER, encoder.model, layers, env.scaling, description, force=True)
     if config.evaluate_episodes:
         description["results"] = _evaluate(folder, make_held_out, config)
-        export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
+        export_bundle(folder, encoder.model, layers, env.scaling, description, force=True)
     return description["results"]
 
 
 @dataclass(frozen=True)
-class _Eyes:
-    """Eyes: bytes of encoder.onnx where there is one, what vae.json says, SHA-256 of both."""
+class _Encoder:
+    """A vision encoder: bytes of encoder.onnx where there is one, what encoder.json says, SHA-256 of both."""
 
-    encoder: bytes | None
-    vae: dict
+    model: bytes | None
+    description: dict
     digest: str
 
     @classmethod
     def load(cls, folder):
         try:
-            text = read_bounded(folder, "vae.json", MAX_MANIFEST_BYTES)
+            text = read_bounded(folder, "encoder.json", MAX_MANIFEST_BYTES)
             vae = json.loads(text)
             learned = vae["representation"] in LEARNED
             encoder = read_bounded(folder, ENCODER, MAX_MODEL_BYTES) if learned else None
@@ -99,22 +99,23 @@ class _Eyes:
             if (folder / CHECKPOINT).exists():
                 remedy = "it is a run; give the folder in which `contactsafe train vae` has come to its end"
             raise InvalidInputError(
-                f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); {remedy}"
+                f"{folder} holds no vision encoder (encoder.json, and encoder.onnx where it is learned); {remedy}"
             ) from error
-        if version != EYES_FORMAT:
+        if version != ENCODER_FORMAT:
             raise InvalidInputError(
-                f"{folder / 'vae.json'} has format {shown(version)}, this version reads {EYES_FORMAT}; "
+                f"{folder / 'encoder.json'} has format {shown(version)}, this version reads {ENCODER_FORMAT}; "
                 f"run `contactsafe train vae --out {folder}` anew"
             )
-        if not _are_eyes(vae):
+        if not _is_valid(vae):
             raise InvalidInputError(
-                f"{folder / 'vae.json'} holds numbers that cannot be; run `contactsafe train vae --out {folder}` anew"
+                f"{folder / 'encoder.json'} holds numbers that cannot be; "
+                f"run `contactsafe train vae --out {folder}` anew"
             )
         return cls(encoder, vae, digest((encoder or b"") + text))
 
 
-def _are_eyes(vae):
-    """Tell whether what vae.json says can be used as it is."""
+def _is_valid(vae):
+    """Tell whether what encoder.json says can be used as it is."""
     statistics = vae.get("latent_mean"), vae.get("latent_std")
     return (
         vae["representation"] in REPRESENTATIONS
@@ -127,30 +128,30 @@ def _are_eyes(vae):
     )
 
 
-def _encoded(raw_env, eyes, config):
-    vae = eyes.vae
+def _encoded(raw_env, encoder, config):
+    vae = encoder.description
     session = None
-    if eyes.encoder is not None:
-        name = str(config.vae / ENCODER)
-        graph = read_graph(eyes.encoder, name)
+    if encoder.model is not None:
+        name = str(config.encoder / ENCODER)
+        graph = read_graph(encoder.model, name)
         check_ports(graph, name, *encoder_ports(vae["size"], len(vae["latent_mean"])))
         session = open_session(graph, name, config.encoder_threads)
     view = (vae["representation"], vae["window_m"], vae["size"])
-    perception = Perception(session, *view, _homography(raw_env), share=True)
+    perception = Perception(session, *view, _homography(raw_env), threaded=True)
     scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
-    scan = Scan(config.scan, rate_hz=config.rate_hz)
-    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, scan)
+    dither = Dither(config.dither, rate_hz=config.rate_hz)
+    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, dither)
 
 
 def _homography(env):
     return getattr(env, "unwrapped", env).camera_homography
 
 
-def _learn(config, env, eyes, state):
+def _learn(config, env, encoder, state):
     """Give the trained model, and how many steps and minutes it took over all sessions."""
     model = config.make_model(env)
-    run = Run(config, model, env, eyes.digest)
-    recorder = Recorder(run, 0.0 if state is None else run.restore(state))
+    run = Run(config, model, env, encoder.digest)
+    recorder = Recorder(run, 0.0 if state is None else run.load_state_dict(state))
     write_json(config.out / "config.json", plain(config))
     # Stable-Baselines3 adds these to the steps done: its total, which the learning rate falls by, stays total_steps.
     remaining = config.total_steps - model.num_timesteps
@@ -161,21 +162,21 @@ def _learn(config, env, eyes, state):
     return model, {"steps": run.saved_steps, "minutes": round(recorder.minutes(), 1)}
 
 
-def _describe(config, eyes, effort):
+def _describe(config, encoder, effort):
     return {
-        "representation": eyes.vae["representation"],
-        "window_m": eyes.vae["window_m"],
-        "view_size": eyes.vae["size"],
-        "latent_size": len(eyes.vae["latent_mean"]),
+        "representation": encoder.description["representation"],
+        "window_m": encoder.description["window_m"],
+        "view_size": encoder.description["size"],
+        "latent_size": len(encoder.description["latent_mean"]),
         "observes": list(config.observes),
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
-        "scan": asdict(Scan(config.scan, rate_hz=config.rate_hz)),
+        "dither": asdict(Dither(config.dither, rate_hz=config.rate_hz)),
         "training": {
             config.algorithm: _portable(plain(config)),
-            "vae": {
+            "encoder": {
                 key: _portable(value) if key == "config" else value
-                for key, value in eyes.vae.items()
+                for key, value in encoder.description.items()
                 if not key.startswith("latent_")
             },
             **effort,
@@ -186,7 +187,7 @@ def _describe(config, eyes, effort):
 
 def _portable(settings):
     """Leave out what names folders of this machine, or this session only."""
-    return {key: value for key, value in settings.items() if key not in ("vae", "out", "resume")}
+    return {key: value for key, value in settings.items() if key not in ("encoder", "out", "resume")}
 
 
 def _evaluate(folder, make_env, config):

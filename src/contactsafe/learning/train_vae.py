@@ -1,4 +1,4 @@
-"""Prepare the policy's eyes: train the β-VAE on masks from the simulator, or set up those that need no training."""
+"""Prepare the vision encoder: train the β-VAE on masks from the simulator, or measure the log-polar features."""
 
 import contextlib
 import math
@@ -25,7 +25,7 @@ from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
 from contactsafe.learning.probe import batches, nearest_ink_error, reconstruction_report
 from contactsafe.learning.recorder import EventFile
-from contactsafe.policy.perception import EYES_FORMAT, Perception
+from contactsafe.policy.perception import ENCODER_FORMAT, Perception
 from contactsafe.vision.rectify import WINDOW_M
 
 _MAY_DIFFER = ("out", "resume", "threads", "held_out", "probe_steps")
@@ -40,9 +40,9 @@ class VaeConfig:
     """Settings of the β-VAE and its training.
 
     Attributes:
-        out: folder of the run: checkpoint, TensorBoard log, encoder.onnx, vae.json.
+        out: folder of the run: checkpoint, TensorBoard log, encoder.onnx, encoder.json.
         resume: go on from the checkpoint in out.
-        representation: "foveated" says where ink is as seen from the tool and needs no training: nothing but its
+        representation: "log_polar" says where ink is as seen from the tool and needs no training: nothing but its
             statistics is measured; "tool" trains the β-VAE on the mask in the tool's frame, "paper" on the camera's.
         window_m: side of the tool's window, m.
         encoder: shape of the network.
@@ -61,7 +61,7 @@ class VaeConfig:
 
     out: Path = Path("runs/vae")
     resume: bool = False
-    representation: Literal["foveated", "tool", "paper"] = "foveated"
+    representation: Literal["log_polar", "tool", "paper"] = "log_polar"
     window_m: float = WINDOW_M
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
     images: int = 20_000
@@ -86,7 +86,7 @@ def train_vae(config, sample_masks, homography):
         homography: board plane to camera pixels, (3, 3).
 
     Returns:
-        The report written to vae.json, a dict.
+        The report written to encoder.json, a dict.
 
     Raises:
         OutputError: out cannot be written, or holds another run.
@@ -97,9 +97,9 @@ def train_vae(config, sample_masks, homography):
 
 
 def _train(config, sample_masks, homography, out):
-    if config.representation == "foveated":
-        report = _report_foveated(config, sample_masks, homography)
-        write_json(out / "vae.json", report)
+    if config.representation == "log_polar":
+        report = _report_log_polar(config, sample_masks, homography)
+        write_json(out / "encoder.json", report)
         return report
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
@@ -131,7 +131,7 @@ def _train(config, sample_masks, homography, out):
 
     report = _report(vae, data, held_out, config)
     export_encoder(vae, out / "encoder.onnx", report["size"])
-    write_json(out / "vae.json", report)
+    write_json(out / "encoder.json", report)
     return report
 
 
@@ -158,17 +158,17 @@ def _train_epoch(vae, optimiser, data, epoch, config):
     return dict(zip(("loss", "reconstruction", "divergence"), totals / steps, strict=True))
 
 
-def _report_foveated(config, sample_masks, homography):
-    """Measure how the numbers of foveated pictures are spread; they are of order one as they are."""
+def _report_log_polar(config, sample_masks, homography):
+    """Measure the statistics of the log-polar features; they are of order one as they are."""
     masks, tools = sample_masks(config.held_out, config.seed)
     size = masks.shape[1]
-    latents = Perception(None, "foveated", config.window_m, size, homography)(masks, tools)
+    latents = Perception(None, "log_polar", config.window_m, size, homography)(masks, tools)
     return _description(config, size, latents.mean(0), np.maximum(latents.std(0), 1.0))
 
 
 def _description(config, size, mean, std):
     return {
-        "format": EYES_FORMAT,
+        "format": ENCODER_FORMAT,
         "representation": config.representation,
         "window_m": config.window_m,
         "size": size,

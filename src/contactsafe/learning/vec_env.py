@@ -9,11 +9,11 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError, shown
-from contactsafe.policy.dither import Scan
-from contactsafe.sim.snapshot import Part, check, of_array, of_object, put, take
+from contactsafe.core.state import Entry, check_state_dict, load_state_dict, of_array, of_object, state_dict
+from contactsafe.policy.dither import Dither
 from contactsafe.tasks.base.evaluation import step_values
 
-_STILL = Scan(amplitude=0.0)
+_STILL = Dither(amplitude=0.0)
 
 
 class EncodedVecEnv(Independent, VecEnv):
@@ -28,7 +28,7 @@ class EncodedVecEnv(Independent, VecEnv):
         scaling: the ObservationScaling.
         action_repeat: environment steps for which one action is given; their rewards are summed.
         reward_scale: rewards are multiplied by this; the metrics are not.
-        scan: motion laid over the actions.
+        dither: motion laid over the actions.
 
     Attributes:
         finished: metrics of the last 100 episodes, a dict each: return, steps, success, ink_left, force_mean_n,
@@ -38,7 +38,7 @@ class EncodedVecEnv(Independent, VecEnv):
         InvalidInputError: the environment resets in another mode, or action_repeat is below 1.
     """
 
-    def __init__(self, env, perception, scaling, action_repeat=1, reward_scale=1.0, scan=_STILL):
+    def __init__(self, env, perception, scaling, action_repeat=1, reward_scale=1.0, dither=_STILL):
         if env.metadata.get("autoreset_mode") != AutoresetMode.SAME_STEP:
             raise InvalidInputError(
                 f"the environment resets by {env.metadata.get('autoreset_mode')}; make it with AutoresetMode.SAME_STEP"
@@ -50,7 +50,7 @@ class EncodedVecEnv(Independent, VecEnv):
         self.scaling = scaling
         self.action_repeat = action_repeat
         self.reward_scale = reward_scale
-        self.scan = scan
+        self.dither = dither
         self.finished: deque[dict] = deque(maxlen=100)
         box = gymnasium.spaces.Box(-scaling.clip, scaling.clip, (len(scaling.centre),), np.float32)
         super().__init__(env.num_envs, box, env.single_action_space)
@@ -87,7 +87,7 @@ class EncodedVecEnv(Independent, VecEnv):
         infos: list[dict] = [{} for _ in range(self.num_envs)]
         actions = self._actions
         for _ in range(self.action_repeat):
-            observation, reward, terminated, truncated, info = self.env.step(self.scan.over(actions, self._steps))
+            observation, reward, terminated, truncated, info = self.env.step(self.dither.over(actions, self._steps))
             done = np.asarray(terminated) | np.asarray(truncated)
             # What the next episode earns while the others finish their repeats belongs to neither transition.
             rewards[~ended] += np.asarray(reward)[~ended]
@@ -132,27 +132,27 @@ class EncodedVecEnv(Independent, VecEnv):
 
     @property
     def keeps_worlds(self):
-        """Whether the environment below has `snapshot` and `restore`; without, a resumed run begins new episodes."""
-        return hasattr(self.env.unwrapped, "snapshot")
+        """Whether the environment below has a `state_dict`; without, a resumed run begins new episodes."""
+        return hasattr(self.env.unwrapped, "state_dict")
 
-    def parts(self):
+    def state_entries(self):
         """List what decides the future, but for the observation that was given last."""
         worlds = {"worlds": of_object(self.env.unwrapped)} if self.keeps_worlds else {}
         return worlds | {
             "steps": of_array(self._steps, 0, 2**53),
-            "tally": Part(
+            "tally": Entry(
                 lambda: {key: value.copy() for key, value in self._tally.items()}, self._set_tally, self._check_tally
             ),
-            "finished": Part(lambda: list(self.finished), self._set_finished, _check_finished),
+            "finished": Entry(lambda: list(self.finished), self._set_finished, _check_finished),
         }
 
-    def snapshot(self):
-        """Take all that decides the future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self):
+        """Return all that decides the future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot):
-        """Put back what `snapshot` gave; the seed kept for the next reset is forgotten."""
-        put(self.parts(), snapshot)
+    def load_state_dict(self, state):
+        """Load what `state_dict` returned; the seed kept for the next reset is forgotten."""
+        load_state_dict(self.state_entries(), state)
         self._seed = None
 
     def _set_tally(self, tally):
@@ -160,22 +160,22 @@ class EncodedVecEnv(Independent, VecEnv):
 
     def _check_tally(self, tally):
         sums = {name: of_array(np.zeros(self.num_envs, np.asarray(value).dtype)) for name, value in dict(tally).items()}
-        check(sums, tally)
+        check_state_dict(sums, tally)
 
-    def check(self, snapshot):
-        """Refuse a snapshot that `restore` could not put back.
+    def check(self, state):
+        """Refuse a state that `load_state_dict` could not load.
 
         Raises:
-            InvalidInputError: naming the part that cannot be.
+            InvalidInputError: naming the entry that cannot be.
         """
-        check(self.parts(), snapshot)
+        check_state_dict(self.state_entries(), state)
 
     def _set_finished(self, episodes):
         self.finished.clear()
         self.finished.extend(episodes)
 
     def close(self):
-        """Close the environment below, and the eyes."""
+        """Close the environment below, and the encoder's threads."""
         self.env.close()
         getattr(self.perception, "close", lambda: None)()
 
@@ -200,4 +200,4 @@ class EncodedVecEnv(Independent, VecEnv):
 def _check_finished(episodes):
     plain = isinstance(episodes, list) and len(episodes) <= 100 and all(isinstance(one, dict) for one in episodes)
     if not plain or not all(isinstance(value, int | float) for one in episodes for value in one.values()):
-        raise InvalidInputError(f"the snapshot holds {shown(episodes)} for finished episodes; start anew")
+        raise InvalidInputError(f"the state holds {shown(episodes)} for finished episodes; start anew")

@@ -18,13 +18,13 @@ import onnxruntime
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import BundleError, InvalidInputError, shown
-from contactsafe.policy.dither import Scan
+from contactsafe.policy.dither import Dither
 from contactsafe.policy.graph import check_ports, read_graph
 from contactsafe.policy.observation import OBSERVED
 from contactsafe.policy.perception import LEARNED, REPRESENTATIONS, encoder_ports, open_session
 from contactsafe.vision.log_polar import FEATURES
 
-FORMAT = 3
+FORMAT = 4
 """Version of the folder's layout; raised when an older reader would misread it."""
 
 FOLDER = "bundle"
@@ -62,7 +62,7 @@ FIELDS = {
     "observes": list,
     "rate_hz": float,
     "action_repeat": int,
-    "scan": dict,
+    "dither": dict,
     "actions": list,
     "observation_scaling": dict,
     "files": dict,
@@ -90,8 +90,8 @@ class Bundle(Independent):
     Attributes:
         folder: where it was read.
         manifest: bundle.json as it stands.
-        encoder: session: "mask" (N, size, size) uint8 to "latent" (N, latent_size) float32; None for foveated pictures,
-            which are computed, not learned.
+        encoder: session: "mask" (N, size, size) uint8 to "latent" (N, latent_size) float32; None for log-polar
+            features, which are computed, not learned.
         policy: session: "state" (N, k), the vectors it observes one after the other, and "latent" (N, latent_size),
             float32, to "action" (N, 18) float32 in [-1, 1].
     """
@@ -134,9 +134,9 @@ class Bundle(Independent):
         return cls(folder, manifest, encoder, policy)
 
     @property
-    def scan(self):
+    def dither(self):
         """The motion laid over its actions."""
-        return Scan(**self.manifest["scan"])
+        return Dither(**self.manifest["dither"])
 
     @property
     def rate_hz(self):
@@ -154,8 +154,11 @@ def _what_is_there(folder):
     if (folder / FOLDER / MANIFEST).is_file():
         return f"{folder} is a run; give its bundle, {folder / FOLDER}"
     run = folder.parent if folder.name == FOLDER else folder
-    if (run / "vae.json").is_file():
-        return f"{run} holds eyes, not a policy; run `contactsafe train ppo --vae {run}`, which leaves a bundle"
+    if (run / "encoder.json").is_file():
+        return (
+            f"{run} holds a vision encoder, not a policy; run `contactsafe train ppo --encoder {run}`, which leaves a "
+            "bundle"
+        )
     if (run / "checkpoint.pt").is_file():
         return (
             f"the run in {run} has left no bundle yet; once it is stopped, the command that began it, with --resume "
@@ -224,9 +227,9 @@ def _read_manifest(folder):
         allowed = ", ".join(REPRESENTATIONS)
         raise BundleError(f"{path}: representation is {shown(manifest['representation'])}, not one of {allowed}")
     try:
-        Scan(**manifest["scan"])
+        Dither(**manifest["dither"])
     except (TypeError, InvalidInputError) as error:
-        raise BundleError(f"{path}: scan is {shown(manifest['scan'])}; export the bundle anew") from error
+        raise BundleError(f"{path}: dither is {shown(manifest['dither'])}; export the bundle anew") from error
     observes = manifest["observes"]
     if not all(isinstance(name, str) and name in OBSERVED for name in observes) or len(set(observes)) < len(observes):
         raise BundleError(f"{path}: observes is {shown(observes)}, not some of {', '.join(OBSERVED)}; export it anew")

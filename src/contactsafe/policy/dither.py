@@ -1,4 +1,4 @@
-"""A small steady motion over the board, laid over what a policy asks for, as a hand makes when it wipes.
+"""Dither: a small steady motion laid over what a policy asks for, as a hand makes when it wipes.
 
 The mean of a policy that has learned with noise can stand still between two patches of ink, where each draws as much as
 the other, or before one that the hand hides and uncovers. Noise had always carried it on; without, it stays for ever. A
@@ -16,7 +16,7 @@ _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 
 
 @dataclass(frozen=True)
-class Scan:
+class Dither:
     """The motion.
 
     Attributes:
@@ -33,7 +33,7 @@ class Scan:
         """Refuse a motion that is none."""
         if not (0.0 <= self.amplitude <= 1.0 and 0.1 <= self.period_s <= 60.0 and 0.1 <= self.rate_hz <= 1000.0):
             raise InvalidInputError(
-                f"scan amplitude = {self.amplitude}, period_s = {self.period_s}, rate_hz = {self.rate_hz}; "
+                f"dither amplitude = {self.amplitude}, period_s = {self.period_s}, rate_hz = {self.rate_hz}; "
                 "give 0 ≤ amplitude ≤ 1, 0.1 ≤ period_s ≤ 60 and 0.1 ≤ rate_hz ≤ 1000"
             )
 

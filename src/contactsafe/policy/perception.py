@@ -6,16 +6,16 @@ import onnxruntime
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import BundleError, InvalidInputError
 from contactsafe.policy.graph import Graph, read_graph
-from contactsafe.vision.log_polar import FEATURES, SHARES, foveate, ground_of
+from contactsafe.vision.log_polar import CHUNKS, FEATURES, ground_of, log_polar_features
 from contactsafe.vision.rectify import rectify
 
 LEARNED = ("tool", "paper")
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
 
-EYES_FORMAT = 3
-"""Version of what vae.json holds and of what its numbers mean."""
+ENCODER_FORMAT = 4
+"""Version of what encoder.json holds and of what its numbers mean."""
 
-REPRESENTATIONS = ("foveated", *LEARNED)
+REPRESENTATIONS = ("log_polar", *LEARNED)
 
 
 class _Session(onnxruntime.InferenceSession):
@@ -67,19 +67,20 @@ class Perception(Independent):
     """Masks and tool positions in, latents out.
 
     Args:
-        session: ONNX Runtime session of the encoder; None for "foveated", which has none.
-        representation: "foveated" says where ink is, seen from the tool (`vision.log_polar`); "tool" shows the encoder
+        session: ONNX Runtime session of the encoder; None for "log_polar", which has none.
+        representation: "log_polar" says where ink is, seen from the tool (`vision.log_polar`); "tool" shows the encoder
             the mask in the tool's frame, "paper" as the camera sees it.
         window_m: side of the tool's window, m; read for "tool".
         size: pixels along a side of what the encoder takes, or of the camera's mask.
         homography: board plane to camera pixels, (3, 3); not read for "paper".
-        share: whether threads of its own share a batch of foveated pictures; not for a control loop. `close` ends them.
+        threaded: whether threads of its own divide a batch of log-polar features; not for a control loop. `close` ends
+            them.
 
     Attributes:
         latent_size: how many numbers come out.
     """
 
-    def __init__(self, session, representation, window_m, size, homography, share=False):
+    def __init__(self, session, representation, window_m, size, homography, threaded=False):
         if representation not in REPRESENTATIONS:
             allowed = ", ".join(REPRESENTATIONS)
             raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
@@ -88,8 +89,8 @@ class Perception(Independent):
         self.window_m = window_m
         self.size = size
         self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
-        self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
-        self._threads = Threads(SHARES) if share and self.ground is not None else None
+        self.ground = ground_of(self.homography, (size, size)) if representation == "log_polar" else None
+        self._threads = Threads(CHUNKS) if threaded and self.ground is not None else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
     def __call__(self, masks, tool_positions):
@@ -106,7 +107,7 @@ class Perception(Independent):
             InvalidInputError: a shape or type differs.
         """
         if self.ground is not None:
-            return foveate(masks, tool_positions, self.ground, self._threads)
+            return log_polar_features(masks, tool_positions, self.ground, self._threads)
         if self.representation == "tool":
             views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
         else:

@@ -32,7 +32,7 @@ class Policy(Independent):
         self.action_repeat = self.bundle.action_repeat
         self.rate_hz = self.bundle.rate_hz
         self._observes = manifest["observes"]
-        self._scan, self._steps = self.bundle.scan, np.zeros(1, int)
+        self._dither, self._steps = self.bundle.dither, np.zeros(1, int)
         self._perceive = Perception(
             self.bundle.encoder, manifest["representation"], manifest["window_m"], manifest["view_size"], homography
         )
@@ -77,7 +77,7 @@ class Policy(Independent):
             raise BundleError(f"{self.bundle.folder} gave an action that is not 18 finite numbers; do not run it")
         if len(self._steps) != len(action):
             self._steps = np.zeros(len(action), int)
-        action = self._scan.over(action, self._steps)
+        action = self._dither.over(action, self._steps)
         self._steps += 1
         return action[0] if single else action
 

@@ -10,7 +10,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.config import BoardConfig
 
 CLEAN, INK, OBJECT = 0, 1, 2
-"""What a cell holds. An OBJECT is dark like ink in the camera's eyes, and no pad removes it."""
+"""What a cell holds. An OBJECT is dark like ink to the camera, and no pad removes it."""
 
 
 class Whiteboard(Independent):

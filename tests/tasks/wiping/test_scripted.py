@@ -1,4 +1,4 @@
-"""The references: the raster needs no eyes and is gentle, chance wipes next to nothing. No torch."""
+"""Scripted policies: the raster needs no images and is gentle, random actions wipe next to nothing. No torch."""
 
 import gymnasium
 import numpy as np
@@ -8,7 +8,7 @@ import contactsafe  # noqa: F401  (registers the task)
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.base.evaluation import evaluate_policy
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.scripted import DESCENT_M_S, Raster, reference
+from contactsafe.tasks.wiping.scripted import DESCENT_M_S, Raster, scripted_policy
 
 CONFIG = WipingConfig()
 
@@ -16,7 +16,7 @@ CONFIG = WipingConfig()
 def results(name, episodes=4):
     env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=episodes, config=CONFIG)
     try:
-        return evaluate_policy(reference(name, CONFIG, env, 0), env, episodes, seed=3)
+        return evaluate_policy(scripted_policy(name, CONFIG, env, 0), env, episodes, seed=3)
     finally:
         env.close()
 
@@ -34,7 +34,7 @@ def test_chance_wipes_next_to_nothing():
 
 def test_a_blank_mask_leaves_the_servo_where_it_is():
     env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=1, config=CONFIG)
-    servo = reference("nearest-ink", CONFIG, env, 0)
+    servo = scripted_policy("nearest-ink", CONFIG, env, 0)
     seen, _ = env.reset(seed=1)
     seen["mask"][:] = 255
     np.testing.assert_allclose(servo.act(seen)[0, :2], 0.0, atol=1e-6)
@@ -58,5 +58,5 @@ def test_lands_slowly_and_each_episode_anew():
 
 def test_unknown_reference():
     with pytest.raises(InvalidInputError) as error:
-        reference("oracle", CONFIG, None, 0)
-    assert str(error.value) == "reference 'oracle' is unknown; choose one of raster, nearest-ink, random"
+        scripted_policy("oracle", CONFIG, None, 0)
+    assert str(error.value) == "scripted policy 'oracle' is unknown; choose one of raster, nearest-ink, random"

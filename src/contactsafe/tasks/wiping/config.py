@@ -10,7 +10,7 @@ from contactsafe.sim.drawings import Boards, check_boards
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.tasks.base.pushes import Pushes
 
-Sight = Literal["mask", "photograph"]
+ImageSource = Literal["mask", "photograph"]
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ class WipingConfig:
         start_height: range of the tool's height above the board at the start, m.
         boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
             first need `contactsafe[handwriting]`.
-        sight: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
-            that changes with every episode; the latter needs `contactsafe[camera]`.
+        image_source: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under
+            light that changes with every episode; the latter needs `contactsafe[camera]`.
         pushes: on the arm while it works; None for none.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
         world: plant, sensors, board, camera, obstacles.
@@ -75,7 +75,7 @@ class WipingConfig:
     start_reach: float = 0.10
     start_height: tuple[float, float] = (0.03, 0.08)
     boards: Boards = "strokes"
-    sight: Sight = "mask"
+    image_source: ImageSource = "mask"
     pushes: Pushes | None = None
     randomisation: Randomisation | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
@@ -83,9 +83,9 @@ class WipingConfig:
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self):
-        """Refuse a time limit, a kind of board or of sight that cannot be."""
+        """Refuse a time limit, a kind of board or an image source that cannot be."""
         check_boards(self.boards)
         if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
             raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
-        if self.sight not in get_args(Sight):
-            raise InvalidInputError(f"sight = {self.sight!r}; choose mask or photograph")
+        if self.image_source not in get_args(ImageSource):
+            raise InvalidInputError(f"image_source = {self.image_source!r}; choose mask or photograph")

@@ -14,8 +14,8 @@ from gymnasium.vector.utils import batch_space
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, state_dict
 from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
-from contactsafe.sim.snapshot import Part, of_generators, of_object, put, take
 from contactsafe.sim.world import POLICY_RATE_HZ
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
@@ -283,21 +283,21 @@ class WipingVectorEnv(_Wiping, gymnasium.vector.VectorEnv):
             "final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended.copy(),
         }  # fmt: skip
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the environment's future."""
         return {"tasks": of_object(self.tasks), "episodes": of_generators(self._rngs)}
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the environment's future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the environment's future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the environment where a snapshot of one made alike was taken: it goes on as that did, to the bit.
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load the state of an environment made alike: this one goes on as that did, to the bit.
 
         Raises:
             InvalidInputError: it is of another environment, or of another version.
         """
-        put(self.parts(), snapshot)
+        load_state_dict(self.state_entries(), state)
         self._was_reset = bool(self._rngs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:

@@ -1,4 +1,4 @@
-"""What a learned policy is held against: a scripted raster, a servo to the nearest ink, and chance. No torch.
+"""Scripted policies to compare a learned one with: a raster, a servo to the nearest ink, random actions. No torch.
 
 Each takes the task's observations and gives its actions as a policy does, 60 times a second.
 """
@@ -8,7 +8,7 @@ import numpy as np
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.vision.log_polar import RINGS, SECTORS, foveate, ground_of
+from contactsafe.vision.log_polar import RINGS, SECTORS, ground_of, log_polar_features
 
 PRESS_N = 5.0
 """Force that the scripts press with, N."""
@@ -59,7 +59,7 @@ class _Script(Independent):
         return np.clip(actions, -1.0, 1.0)
 
     def _press(self, i, force):
-        """Give the step of x_d downwards, m: at a steady speed to the board, then after the force."""
+        """Return the step of x_d downwards, m: at a steady speed to the board, then after the force."""
         self._landed[i] |= force > TOUCH_N
         if not self._landed[i]:
             return -DESCENT_M_S / 60.0
@@ -96,7 +96,7 @@ class Raster(_Script):
 
 
 class NearestInk(_Script):
-    """Go straight to the nearest ink in sight, as a visual servo would."""
+    """Go straight to the nearest ink in view, as a visual servo would."""
 
     def __init__(self, config: WipingConfig, num_envs: int, homography: np.ndarray):
         super().__init__(config, num_envs)
@@ -105,25 +105,25 @@ class NearestInk(_Script):
 
     def act(self, observation):
         """Choose the actions, (N, 18), for N observations."""
-        picture = foveate(observation["mask"], observation["pose"], self._ground)
+        picture = log_polar_features(observation["mask"], observation["pose"], self._ground)
         soft = picture[:, RINGS * SECTORS : RINGS * SECTORS + 3]
         length = np.linalg.norm(soft[:, :2], axis=1, keepdims=True)
         self._away = 0.1 * soft[:, 2:] * soft[:, :2] / np.maximum(length, 1e-9)
         return super().act(observation)
 
     def _goal(self, i, observation):
-        # Beyond the ink by the way that friction keeps the tool behind.
+        # Beyond the ink by the distance that friction keeps the tool behind.
         away = self._away[i]
         beyond = ARRIVED_M / max(float(np.linalg.norm(away)), ARRIVED_M)
         return observation["pose"][i, :2] + away * (1.0 + beyond), True
 
 
-class Chance(Independent):
-    """Actions drawn evenly from all that are allowed.
+class RandomPolicy(Independent):
+    """Actions sampled uniformly from all that are allowed.
 
     Args:
         num_envs: tasks side by side.
-        seed: of the draw.
+        seed: of the samples.
     """
 
     action_repeat = 1
@@ -132,15 +132,15 @@ class Chance(Independent):
         self._rng, self._shape = np.random.default_rng(seed), (num_envs, 18)
 
     def act(self, observation) -> np.ndarray:
-        """Draw the actions, (N, 18)."""
+        """Sample the actions, (N, 18)."""
         return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
 
 
-REFERENCES = ("raster", "nearest-ink", "random")
+SCRIPTED = ("raster", "nearest-ink", "random")
 
 
-def reference(name: str, config: WipingConfig, env, seed: int):
-    """Make a reference by name for a vector environment of the task.
+def scripted_policy(name: str, config: WipingConfig, env, seed: int):
+    """Make a scripted policy by name for a vector environment of the task.
 
     Raises:
         InvalidInputError: the name is unknown.
@@ -150,5 +150,5 @@ def reference(name: str, config: WipingConfig, env, seed: int):
     if name == "nearest-ink":
         return NearestInk(config, env.num_envs, env.unwrapped.camera_homography)
     if name == "random":
-        return Chance(env.num_envs, seed)
-    raise InvalidInputError(f"reference '{name}' is unknown; choose one of {', '.join(REFERENCES)}")
+        return RandomPolicy(env.num_envs, seed)
+    raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")

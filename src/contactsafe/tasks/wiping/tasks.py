@@ -9,6 +9,7 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, of_records, state_dict
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import action_limits
 from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
@@ -21,7 +22,6 @@ from contactsafe.sim.camera import camera_at
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.drawings import paint_board
 from contactsafe.sim.ink import nearest_ink
-from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
 from contactsafe.sim.variation import Variation
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 from contactsafe.tasks.base.pushes import Pusher
@@ -29,9 +29,9 @@ from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.step import REWARD_TERMS, observe, rewards_dtype, step_tasks, task_dtype
 
 
-def _sight(config: WipingConfig, worlds: Worlds):
-    """Give what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
-    if config.sight == "mask":
+def _image_source(config: WipingConfig, worlds: Worlds):
+    """Return what looks at the worlds in place of their own masks, if anything; OpenCV is loaded for it alone."""
+    if config.image_source == "mask":
         return None
     from contactsafe.tasks.wiping.photographs import PhotographSource
 
@@ -89,7 +89,7 @@ class WipingTasks(Independent):
         self._variation = None if ranges is None else Variation(self.worlds, ranges)
         self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
         self.tasks = np.zeros(n, dtype=task_dtype)
-        self._sight = _sight(self.config, self.worlds)
+        self._images = _image_source(self.config, self.worlds)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.config.world.board.centre)
         self._rewards = np.zeros(1, dtype=rewards_dtype)
@@ -141,7 +141,7 @@ class WipingTasks(Independent):
         )
         task["steps"], task["ink_start"], task["ink"], task["distance"] = 0, ink, ink, distance
         task["clean"], task["arm_touched"] = 0, 0
-        task["light"] = 0 if self._sight is None else rng.integers(2**31)
+        task["light"] = 0 if self._images is None else rng.integers(2**31)
         self._look_first(i)
 
     def observe(self, i: int) -> None:
@@ -153,25 +153,25 @@ class WipingTasks(Independent):
         worlds, task = self.worlds, self.tasks[i]
         camera = camera_at(worlds.cameras, worlds.plants[i]["camera"])
         observe(worlds.plants[i], worlds.controllers[i], camera, worlds.ink_index.shown[i], task, worlds.masks[i])
-        if self._sight is not None:
-            self._sight.look(i, i + 1, self.tasks)
+        if self._images is not None:
+            self._images.look(i, i + 1, self.tasks)
         if self._variation is not None:
             self._variation.look_first(i)
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the tasks' future."""
-        parts = {} if self._variation is None else {"variation": of_object(self._variation)}
+        entries = {} if self._variation is None else {"variation": of_object(self._variation)}
         if self._pusher is not None:
-            parts["pushes"] = of_generators(self._pusher.rngs)
-        return {**parts, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks, {"light": (0, 2**31)})}
+            entries["pushes"] = of_generators(self._pusher.rngs)
+        return {**entries, "worlds": of_object(self.worlds), "tasks": of_records(self.tasks, {"light": (0, 2**31)})}
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the tasks' future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the tasks' future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the tasks where a snapshot was taken; see `Worlds.restore`."""
-        put(self.parts(), snapshot)
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load a state of tasks made alike; see `Worlds.load_state_dict`."""
+        load_state_dict(self.state_entries(), state)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
         """Give the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
@@ -215,8 +215,8 @@ class WipingTasks(Independent):
 
     def _look(self, start: int, stop: int) -> None:
         """Make of the masks of tasks start to stop what the policy is to see of them."""
-        if self._sight is not None:
-            self._sight.look(start, stop, self.tasks)
+        if self._images is not None:
+            self._images.look(start, stop, self.tasks)
         if self._variation is not None:
             self._variation.look(start, stop)
 
@@ -263,7 +263,7 @@ def _warm_up(tasks: WipingTasks) -> None:
     """Wipe for one step on a board of our own: the first step in a process compiles or loads for a long time."""
     kind = next(kind for kind in type(tasks).__mro__ if kind.__module__.startswith("contactsafe."))
     config = tasks.config
-    sort = (kind, config.sight, config.randomisation is not None)
+    sort = (kind, config.image_source, config.randomisation is not None)
     if sort in _WARM:
         return
     _WARM.add(sort)

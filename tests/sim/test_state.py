@@ -1,4 +1,4 @@
-"""Worlds put back where they were go on as they did, to the bit, in the same process or in new memory."""
+"""Worlds given a state they had go on as they did, to the bit, in the same process or in new memory."""
 
 import numpy as np
 import pytest
@@ -38,12 +38,12 @@ def assert_same(a, b):
 
 @pytest.fixture(scope="module")
 def course():
-    """A snapshot amidst a course of events, and how it went on."""
+    """A state amidst a course of events, and how it went on."""
     worlds = busy_worlds(3)
     begin(worlds)
-    snapshot = worlds.snapshot()
+    state = worlds.state_dict()
     trace = run(worlds, 120)
-    yield worlds, snapshot, trace, worlds.cells.copy(), worlds.render().copy()
+    yield worlds, state, trace, worlds.cells.copy(), worlds.render().copy()
     worlds.close()
 
 
@@ -56,19 +56,19 @@ def test_the_course_has_what_could_be_forgotten(course):
 
 
 def test_the_same_worlds_go_on_alike(course):
-    worlds, snapshot, trace, cells, masks = course
+    worlds, state, trace, cells, masks = course
     run(worlds, 30)
-    worlds.restore(snapshot)
+    worlds.load_state_dict(state)
     assert_same(run(worlds, 120), trace)
     assert_array_equal(worlds.cells, cells)
     assert_array_equal(worlds.render(), masks)
 
 
 def test_new_worlds_go_on_alike(course):
-    _, snapshot, trace, cells, masks = course
+    _, state, trace, cells, masks = course
     fresh = busy_worlds(99)
     addresses = fresh.plants["data"].copy(), fresh.controllers["handle"].copy()
-    fresh.restore(snapshot)
+    fresh.load_state_dict(state)
     assert_same(run(fresh, 120), trace)
     assert_array_equal(fresh.cells, cells)
     assert_array_equal(fresh.render(), masks)
@@ -78,11 +78,11 @@ def test_new_worlds_go_on_alike(course):
 
 
 def test_new_worlds_draw_the_same_bias_at_their_next_reset(course):
-    _, snapshot, _, _, _ = course
+    _, state, _, _, _ = course
     biases = []
     for _ in range(2):
         worlds = busy_worlds(None)
-        worlds.restore(snapshot)
+        worlds.load_state_dict(state)
         worlds.reset(1, panda().home)
         biases.append(worlds.plants["wrench_bias"][1].copy())
         worlds.close()
@@ -90,8 +90,8 @@ def test_new_worlds_draw_the_same_bias_at_their_next_reset(course):
     assert_array_equal(*biases)
 
 
-def test_a_snapshot_is_plain_and_does_not_change(course):
-    worlds, snapshot, _, _, _ = course
+def test_a_state_is_plain_and_does_not_change(course):
+    worlds, state, _, _, _ = course
 
     def assert_plain(value):
         if isinstance(value, dict | list):
@@ -102,23 +102,23 @@ def test_a_snapshot_is_plain_and_does_not_change(course):
         else:
             assert isinstance(value, int | str)
 
-    assert_plain(snapshot)
-    assert not any(name in snapshot["plants"] for name in ("data", "model", "qpos", "qpos_spring"))
-    assert "handle.data" not in snapshot["controllers"]
-    ticks = snapshot["plants"]["tick"].copy()
+    assert_plain(state)
+    assert not any(name in state["plants"] for name in ("data", "model", "qpos", "qpos_spring"))
+    assert "handle.data" not in state["controllers"]
+    ticks = state["plants"]["tick"].copy()
     run(worlds, 5)
-    assert_array_equal(snapshot["plants"]["tick"], ticks)
+    assert_array_equal(state["plants"]["tick"], ticks)
 
 
-def test_a_snapshot_of_something_else_is_refused(course):
-    worlds, snapshot, _, _, _ = course
+def test_a_state_of_something_else_is_refused(course):
+    worlds, state, _, _, _ = course
     with pytest.raises(
-        InvalidInputError, match=r"^the snapshot holds cells, not cells, controllers, masks, .*; start anew$"
+        InvalidInputError, match=r"^the state holds cells, not cells, controllers, masks, .*; start anew$"
     ):
-        worlds.restore({"cells": snapshot["cells"]})
+        worlds.load_state_dict({"cells": state["cells"]})
     with pytest.raises(InvalidInputError) as error:
-        worlds.restore({**snapshot, "cells": snapshot["cells"][:, :3]})
-    assert str(error.value) == "the snapshot holds an array (2, 3, 300) for one of (2, 250, 300); start anew"
+        worlds.load_state_dict({**state, "cells": state["cells"][:, :3]})
+    assert str(error.value) == "the state holds an array (2, 3, 300) for one of (2, 250, 300); start anew"
 
 
 @pytest.mark.parametrize(
@@ -133,23 +133,23 @@ def test_a_snapshot_of_something_else_is_refused(course):
         ("controllers", "state.tau", np.nan),
     ],
 )
-def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, part, field, value):
-    worlds, snapshot, _, _, _ = course
-    spoiled = {**snapshot, part: {name: array.copy() for name, array in snapshot[part].items()}}
-    spoiled["cells"] = np.zeros_like(snapshot["cells"])
+def test_an_index_of_1e9_in_a_state_is_refused_and_nothing_changed(course, part, field, value):
+    worlds, state, _, _, _ = course
+    spoiled = {**state, part: {name: array.copy() for name, array in state[part].items()}}
+    spoiled["cells"] = np.zeros_like(state["cells"])
     spoiled[part][field].reshape(-1)[-1] = value
-    before = worlds.snapshot()
-    with pytest.raises(InvalidInputError, match=r"^the snapshot holds .* start anew$") as error:
-        worlds.restore(spoiled)
+    before = worlds.state_dict()
+    with pytest.raises(InvalidInputError, match=r"^the state holds .* start anew$") as error:
+        worlds.load_state_dict(spoiled)
     assert f"({part}.{field})" in str(error.value)
-    after = worlds.snapshot()
+    after = worlds.state_dict()
     assert_array_equal(after["cells"], before["cells"])
     assert_array_equal(after["plants"]["tick"], before["plants"]["tick"])
 
 
 def test_a_random_generator_whose_state_is_an_index_is_refused(course):
-    worlds, snapshot, _, _, _ = course
+    worlds, state, _, _, _ = course
     twister = {"bit_generator": "MT19937", "state": {"key": [0] * 624, "pos": 10**9}}
-    for state in (twister, {"bit_generator": "seed"}, {}, {**snapshot["noise"][0], "state": {"state": ["x"]}}):
+    for spoilt in (twister, {"bit_generator": "seed"}, {}, {**state["noise"][0], "state": {"state": ["x"]}}):
         with pytest.raises(InvalidInputError, match="which is not the state of a random generator"):
-            worlds.restore({**snapshot, "noise": [state, state]})
+            worlds.load_state_dict({**state, "noise": [spoilt, spoilt]})

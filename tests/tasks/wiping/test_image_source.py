@@ -15,7 +15,7 @@ from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 NAME = "contactsafe/Wiping-v0"
-PHOTOGRAPHED = WipingConfig(boards="handwriting", sight="photograph", episode_s=0.1)
+PHOTOGRAPHED = WipingConfig(boards="handwriting", image_source="photograph", episode_s=0.1)
 
 
 def agreement(a, b):
@@ -40,7 +40,7 @@ def test_a_drawing_of_ones_own_wins():
 
 
 def test_the_sight_changes_no_board_and_no_start():
-    plain, seen = (gymnasium.make(NAME, config=WipingConfig(sight=sight)) for sight in ("mask", "photograph"))
+    plain, seen = (gymnasium.make(NAME, config=WipingConfig(image_source=sight)) for sight in ("mask", "photograph"))
     (a, _), (b, _) = plain.reset(seed=5), seen.reset(seed=5)
     assert_array_equal(plain.unwrapped.tasks.worlds.cells, seen.unwrapped.tasks.worlds.cells)
     assert_array_equal(a["pose"], b["pose"])
@@ -98,7 +98,7 @@ def test_light_and_noise_follow_from_the_tasks_record_alone():
     ("fields", "text"),
     [
         ({"boards": "crayon"}, "boards = 'crayon'; choose strokes, digits, text or handwriting"),
-        ({"sight": "x-ray"}, "sight = 'x-ray'; choose mask or photograph"),
+        ({"image_source": "x-ray"}, "sight = 'x-ray'; choose mask or photograph"),
     ],
 )
 def test_other_kinds_are_refused(fields, text):
