@@ -27,6 +27,7 @@ from contactsafe.sim.camera import camera_at, render_mask_into
 from contactsafe.sim.ink import nearest_ink, remove_erased
 from contactsafe.sim.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
+from contactsafe.tasks import WIPING
 from contactsafe.tasks.wiping.config import WipingConfig
 
 ROLLOUTS = 6
@@ -65,10 +66,10 @@ def timed(owner, name, spent):
 def make(config):
     """Make the environment as `contactsafe train` does, on log-polar features whose statistics do not matter here."""
     task = WipingConfig(randomisation=Randomisation.broad())
-    raw = gymnasium.make_vec(config.env_id, num_envs=config.num_envs, config=task)
+    raw = gymnasium.make_vec(WIPING, num_envs=config.num_envs, config=task)
     perception = Perception(None, "log_polar", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
     zeros = np.zeros(perception.latent_size)
-    scaling = ObservationScaling.from_statistics(config.observes, zeros, zeros + 1.0)
+    scaling = ObservationScaling.from_statistics(raw.unwrapped.observation_vectors, zeros, zeros + 1.0)
     return EncodedVecEnv(raw, perception, scaling, dither=Dither(config.dither))
 
 

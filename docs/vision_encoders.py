@@ -1,8 +1,8 @@
 """Compare vision encoders: how much of the ink, and the last of it, can be read off the latent of each.
 
 `python docs/vision_encoders.py` prints the table of docs/concepts/vision.md. All see the same held-out boards,
-and the same small networks read them: one says where the nearest ink lies, one marks the cells of 2 cm about the tool that hold ink. What
-they cannot read, a policy of that size will not learn to use.
+and the same small networks read them: one says where the nearest ink lies, one marks the cells of 2 cm about the tool
+that hold ink. What they cannot read, a policy of that size will not learn to use.
 """
 
 import sys

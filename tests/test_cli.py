@@ -40,7 +40,7 @@ def mistake(capsys, *words):
 
 @pytest.fixture
 def bundle(tmp_path):
-    return shutil.copytree(shipped_bundle(), tmp_path / "bundle")
+    return shutil.copytree(shipped_bundle("wiping"), tmp_path / "bundle")
 
 
 def test_help_lists_every_command_with_what_it_does(capsys):

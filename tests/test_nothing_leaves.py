@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 LOAD = """
 import time
 from contactsafe.policy.bundle import Bundle, shipped_bundle
-Bundle.load(shipped_bundle())
+Bundle.load(shipped_bundle("wiping"))
 time.sleep(1.0)
 """
 

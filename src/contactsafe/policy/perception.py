@@ -5,34 +5,39 @@ import onnxruntime
 
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import BundleError, InvalidInputError
-from contactsafe.policy.graph import Graph, read_graph
+from contactsafe.policy.graph import Graph, Ports, read_graph
 from contactsafe.vision.log_polar import CHUNKS, FEATURES, ground_of, log_polar_features
 from contactsafe.vision.rectify import rectify
 
 LEARNED = ("tool", "paper")
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
 
+NO_IMAGE = "none"
+"""Representation of a policy that sees no images: its latent has no numbers."""
+
 ENCODER_FORMAT = 4
 """Version of what encoder.json holds and of what its numbers mean."""
 
-REPRESENTATIONS = ("log_polar", *LEARNED)
+WITH_IMAGE = ("log_polar", *LEARNED)
+
+REPRESENTATIONS = (*WITH_IMAGE, NO_IMAGE)
 
 
 class _Session(onnxruntime.InferenceSession):
     """A session that copies and pickles as the bytes it was started on; copies check and start them again."""
 
-    def __init__(self, model, name, options):
+    def __init__(self, model: bytes, name: str, options: onnxruntime.SessionOptions):
         super().__init__(model, options, providers=["CPUExecutionProvider"])
         self._opened = model, name, options.intra_op_num_threads
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         return open_session, self._opened
 
-    def __copy__(self):
+    def __copy__(self) -> "onnxruntime.InferenceSession":
         return open_session(*self._opened)
 
 
-def open_session(model, name, threads=1):
+def open_session(model: bytes | Graph, name: str, threads: int = 1) -> onnxruntime.InferenceSession:
     """Start ONNX Runtime on a model held in memory, once it has been checked.
 
     Args:
@@ -58,8 +63,8 @@ def open_session(model, name, threads=1):
         raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
 
 
-def encoder_ports(size, latent_size):
-    """Give inputs and outputs of an encoder of pictures of so many pixels along a side, as `graph.check_ports` does."""
+def encoder_ports(size: int, latent_size: int) -> tuple[Ports, Ports]:
+    """Return inputs and outputs of an encoder of images of so many pixels along a side."""
     return {"mask": ("uint8", [size, size])}, {"latent": ("float", [latent_size])}
 
 
@@ -68,11 +73,11 @@ class Perception(Independent):
 
     Args:
         session: ONNX Runtime session of the encoder; None for "log_polar", which has none.
-        representation: "log_polar" says where ink is, seen from the tool (`vision.log_polar`); "tool" shows the encoder
-            the mask in the tool's frame, "paper" as the camera sees it.
+        representation: "log_polar" has features of the mask about the tool (`vision.log_polar`); "tool" shows the
+            encoder the mask in the tool's frame, "paper" as the camera sees it.
         window_m: side of the tool's window, m; read for "tool".
         size: pixels along a side of what the encoder takes, or of the camera's mask.
-        homography: board plane to camera pixels, (3, 3); not read for "paper".
+        homography: working plane to camera pixels, (3, 3); not read for "paper".
         threaded: whether threads of its own divide a batch of log-polar features; not for a control loop. `close` ends
             them.
 
@@ -80,9 +85,17 @@ class Perception(Independent):
         latent_size: how many numbers come out.
     """
 
-    def __init__(self, session, representation, window_m, size, homography, threaded=False):
-        if representation not in REPRESENTATIONS:
-            allowed = ", ".join(REPRESENTATIONS)
+    def __init__(
+        self,
+        session: onnxruntime.InferenceSession | None,
+        representation: str,
+        window_m: float,
+        size: int,
+        homography: np.ndarray | None,
+        threaded: bool = False,
+    ):
+        if representation not in WITH_IMAGE:
+            allowed = ", ".join(WITH_IMAGE)
             raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
         self.session = session
         self.representation = representation
@@ -93,11 +106,11 @@ class Perception(Independent):
         self._threads = Threads(CHUNKS) if threaded and self.ground is not None else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
-    def __call__(self, masks, tool_positions):
+    def __call__(self, masks: np.ndarray, tool_positions: np.ndarray) -> np.ndarray:
         """Encode a batch.
 
         Args:
-            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, ink 0.
+            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, foreground 0.
             tool_positions: (N, 2) or wider, m, world; x and y are read.
 
         Returns:
@@ -120,7 +133,7 @@ class Perception(Independent):
                 )
         return self.session.run(["latent"], {"mask": views})[0]
 
-    def close(self):
+    def close(self) -> None:
         """End the threads."""
         if self._threads is not None:
             self._threads.close()

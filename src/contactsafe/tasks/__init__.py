@@ -1,44 +1,56 @@
-"""Gymnasium environments: the wiping task, single and vector, its actions and rewards, in two engines."""
+"""Tasks, each a room of its own and a line in `TASKS`; what all share is in `base`."""
 
-from typing import Any, cast
-
-import gymnasium
+from typing import Any
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.entry import TaskEntry
 
 WIPING = "contactsafe/Wiping-v0"
 WIPING_BULLET = "contactsafe/WipingBullet-v0"
 
-ENGINES = {"mujoco": WIPING, "pybullet": WIPING_BULLET}
+TASKS = {
+    entry.name: entry
+    for entry in (
+        TaskEntry(
+            "wiping",
+            environments={"mujoco": WIPING, "pybullet": WIPING_BULLET},
+            entry_points={
+                WIPING: ("contactsafe.tasks.wiping.env:WipingEnv", "contactsafe.tasks.wiping.env:WipingVectorEnv"),
+                WIPING_BULLET: (
+                    "contactsafe.tasks.wiping.bullet:WipingBulletEnv",
+                    "contactsafe.tasks.wiping.bullet:WipingBulletVectorEnv",
+                ),
+            },
+            module="contactsafe.tasks.wiping.task",
+            has_camera=True,
+        ),
+    )
+}
+"""All tasks by name, the one that commands take where none is named first."""
+
+DEFAULT_TASK = next(iter(TASKS))
+
+ENGINES = TASKS["wiping"].environments
 """The wiping task by the engine that computes its physics."""
 
 
-def register() -> None:
-    """Make the wiping tasks known to Gymnasium; importing contactsafe does this."""
-    for name, place in ((WIPING, "env:Wiping"), (WIPING_BULLET, "bullet:WipingBullet")):
-        if name not in gymnasium.registry:
-            gymnasium.register(
-                name,
-                entry_point=f"contactsafe.tasks.wiping.{place}Env",
-                vector_entry_point=f"contactsafe.tasks.wiping.{place}VectorEnv",
-            )
-
-
-def make_engine(engine: str, num_envs: int, config: Any = None):
-    """Make the vector environment of the wiping task in one of two engines.
-
-    Args:
-        engine: 'mujoco' or 'pybullet'.
-        num_envs: how many boards.
-        config: a `WipingConfig`; None for the defaults.
-
-    Returns:
-        A `WipingVectorEnv`.
+def task_by_name(name: str) -> TaskEntry:
+    """Return a task's entry.
 
     Raises:
-        InvalidInputError: unknown engine, or one that is not installed.
+        InvalidInputError: the name is unknown.
     """
-    if engine not in ENGINES:
-        raise InvalidInputError(f"engine = {engine!r}; choose {' or '.join(ENGINES)}")
-    register()
-    return cast(Any, gymnasium.make_vec(ENGINES[engine], num_envs=num_envs, config=config))
+    if name not in TASKS:
+        raise InvalidInputError(f"task '{name}' is unknown; choose from {', '.join(TASKS)}")
+    return TASKS[name]
+
+
+def register() -> None:
+    """Make all tasks known to Gymnasium; importing contactsafe does this."""
+    for entry in TASKS.values():
+        entry.register()
+
+
+def make_engine(engine: str, num_envs: int, config: Any = None) -> Any:
+    """Make the vector environment of the wiping task in one of two engines; see `TaskEntry.make_vec`."""
+    return TASKS["wiping"].make_vec(num_envs, config, engine)

@@ -64,11 +64,11 @@ def test_where_the_arm_hides_the_board_is_known_by_its_encoders():
     """Encoders that are off move the silhouette that is masked out, while the photograph stays what it was."""
     tasks = WipingTasks(PHOTOGRAPHED)
     tasks.reset(0, np.random.default_rng(1), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.05))
-    before, picture = tasks.worlds.masks[0].copy(), tasks._sight.photograph(0, tasks.tasks[0])
+    before, picture = tasks.worlds.masks[0].copy(), tasks._images.photograph(0, tasks.tasks[0])
     tasks.worlds.plants[0]["q_seen"][0] += 0.2
     tasks.observe(0)
     assert not np.array_equal(tasks.worlds.masks[0], before)
-    assert_array_equal(tasks._sight.photograph(0, tasks.tasks[0]), picture)
+    assert_array_equal(tasks._images.photograph(0, tasks.tasks[0]), picture)
 
 
 def test_many_environments_see_what_each_would_see_alone():

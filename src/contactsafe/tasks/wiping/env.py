@@ -15,9 +15,12 @@ from gymnasium.vector.utils import batch_space
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, state_dict
-from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
+from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.policy.observation import Observation
 from contactsafe.sim.world import POLICY_RATE_HZ
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.figures import EPISODE_METRICS, FIGURES
+from contactsafe.tasks.wiping.observation import observation_vectors
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 _RENDER_MODES = ["rgb_array"]
@@ -27,7 +30,10 @@ def _spaces(config: WipingConfig) -> tuple[gymnasium.spaces.Dict, gymnasium.spac
     size = config.world.camera.size
     observation = gymnasium.spaces.Dict(
         {
-            **{name: gymnasium.spaces.Box(-np.inf, np.inf, (k,), np.float32) for name, k in OBSERVED.items()},
+            **{
+                vector.name: gymnasium.spaces.Box(-np.inf, np.inf, (vector.size,), np.float32)
+                for vector in observation_vectors(config.action)
+            },
             "mask": gymnasium.spaces.Box(0, 255, (size, size, 1), np.uint8),
         }
     )
@@ -42,6 +48,8 @@ class _Wiping(Independent):
 
     metadata: dict[str, Any] = {"render_modes": _RENDER_MODES, "render_fps": POLICY_RATE_HZ}
     task_type: type[WipingTasks] = WipingTasks
+    episode_metrics = EPISODE_METRICS
+    figures = FIGURES
     _spec: EnvSpec | None = None
     _was_reset = _is_closed = False
 
@@ -69,6 +77,11 @@ class _Wiping(Independent):
         self._spec = copy.copy(spec)
         if self._spec is not None and self._spec.max_episode_steps is None:
             self._spec.max_episode_steps = self.tasks.step_limit
+
+    @property
+    def observation_vectors(self) -> tuple[Observation, ...]:
+        """What policies may observe besides the mask."""
+        return observation_vectors(self.tasks.config.action)
 
     @property
     def camera_homography(self) -> np.ndarray:

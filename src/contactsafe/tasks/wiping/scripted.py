@@ -3,6 +3,9 @@
 Each takes the task's observations and gives its actions as a policy does, 60 times a second.
 """
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 
 from contactsafe.core.copying import Independent
@@ -136,19 +139,20 @@ class RandomPolicy(Independent):
         return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
 
 
-SCRIPTED = ("raster", "nearest-ink", "random")
+SCRIPTED: Mapping[str, Callable[[WipingConfig, Any, int], Any]] = {
+    "raster": lambda config, env, seed: Raster(config, env.num_envs),
+    "nearest-ink": lambda config, env, seed: NearestInk(config, env.num_envs, env.unwrapped.camera_homography),
+    "random": lambda config, env, seed: RandomPolicy(env.num_envs, seed),
+}
+"""Scripted policies by name, made for a vector environment of the task."""
 
 
-def scripted_policy(name: str, config: WipingConfig, env, seed: int):
+def scripted_policy(name: str, config: WipingConfig, env: Any, seed: int) -> Any:
     """Make a scripted policy by name for a vector environment of the task.
 
     Raises:
         InvalidInputError: the name is unknown.
     """
-    if name == "raster":
-        return Raster(config, env.num_envs)
-    if name == "nearest-ink":
-        return NearestInk(config, env.num_envs, env.unwrapped.camera_homography)
-    if name == "random":
-        return RandomPolicy(env.num_envs, seed)
-    raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")
+    if name not in SCRIPTED:
+        raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")
+    return SCRIPTED[name](config, env, seed)

@@ -13,6 +13,9 @@ REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_tabl
 _f = np.float64
 _i = np.int64
 
+VECTORS = ("pose", "target", "force")
+"""Fields of `task_dtype` that policies observe."""
+
 task_dtype = np.dtype(
     [
         ("steps", _i),  # policy steps since reset

@@ -11,8 +11,7 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, of_records, state_dict
 from contactsafe.policy.action import DOWN
-from contactsafe.policy.action_config import action_limits
-from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
+from contactsafe.policy.action_config import ACTION_SIZE, action_limits
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
@@ -26,7 +25,7 @@ from contactsafe.sim.variation import Variation
 from contactsafe.sim.world import POLICY_RATE_HZ, Worlds, ticks_of_step
 from contactsafe.tasks.base.pushes import Pusher
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.step import REWARD_TERMS, observe, rewards_dtype, step_tasks, task_dtype
+from contactsafe.tasks.wiping.step import REWARD_TERMS, VECTORS, observe, rewards_dtype, step_tasks, task_dtype
 
 
 def _image_source(config: WipingConfig, worlds: Worlds):
@@ -223,7 +222,7 @@ class WipingTasks(Independent):
     def observation(self, i=slice(None)) -> dict[str, np.ndarray]:
         """Give what the policies see, copied: pose, target, force float32 (n, 6), (n, 18), (n, 3); mask uint8."""
         return {
-            **{name: self.tasks[name][i].astype(np.float32) for name in OBSERVED},
+            **{name: self.tasks[name][i].astype(np.float32) for name in VECTORS},
             "mask": self.worlds.masks[i][..., None].copy(),
         }
 
