@@ -6,6 +6,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from contactsafe.core.state import Entry, load_state_dict, of_array, of_generators, state_dict
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.tasks.wiping.figures import EPISODE_METRICS, FIGURES
+from contactsafe.tasks.wiping.observation import observation_vectors
 
 BOARD = np.array([0.5, 0.0])
 INK_SIDE_M = 0.30
@@ -87,6 +90,9 @@ class FakeWiping(VectorEnv):
     """A pad that glides over the board at once to where it is told; SAME_STEP autoreset, as the real task has it."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    observation_vectors = observation_vectors(ActionConfig())
+    episode_metrics = EPISODE_METRICS
+    figures = FIGURES
 
     def __init__(self, num_envs=4, max_steps=60):
         self.num_envs = num_envs

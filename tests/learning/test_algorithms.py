@@ -22,7 +22,6 @@ from contactsafe.learning.replay import ReplayFile  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.observation import ObservationScaling  # noqa: E402
-from contactsafe.tasks.wiping.tasks import OBSERVED  # noqa: E402
 
 SMALL = {
     "num_envs": 4,
@@ -84,9 +83,9 @@ def test_the_bundle_acts_as_the_model_does(config, encoder, tmp_path, monkeypatc
     assert bundle.manifest["training"]["steps"] == 256
     assert bundle.manifest["results"]["episodes"] == 4
     rng = np.random.default_rng(0)
-    seen = {name: rng.normal(size=(9, k)).astype(np.float32) for name, k in OBSERVED.items()}
+    seen = {name: rng.normal(size=(9, k)).astype(np.float32) for name, k in bundle.observes.items()}
     latent = rng.normal(size=(9, 128)).astype(np.float32)
-    observes = bundle.manifest["observes"]
+    observes = tuple(bundle.observes)
     scaling = ObservationScaling(observes, **bundle.manifest["observation_scaling"])
     wanted, _ = models[0].predict(scaling(seen, latent), deterministic=True)
     state = np.concatenate([seen[name] for name in observes], axis=1)
@@ -111,7 +110,7 @@ def test_sac_learns_to_go_where_the_ink_is(encoder, tmp_path):
 
 def test_the_learning_rate_falls_with_absolute_steps():
     rate = PpoConfig(learning_rate=0.1).falling_rate()
-    assert [rate(share) for share in (1.0, 0.5, 0.0)] == pytest.approx([0.1, 0.05, 0.005])
+    assert [rate(left) for left in (1.0, 0.5, 0.0)] == pytest.approx([0.1, 0.05, 0.005])
 
 
 class Memory:

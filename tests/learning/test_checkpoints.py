@@ -25,14 +25,13 @@ from contactsafe.core.files import held  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import (  # noqa: E402
     CHECKPOINT,
-    as_started,
     load_checkpoint,
-    pack,
     save_checkpoint,
-    unpack,
 )
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
+from contactsafe.learning.packing import pack, unpack  # noqa: E402
 from contactsafe.learning.recorder import EventFile  # noqa: E402
+from contactsafe.learning.settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
 

@@ -22,8 +22,9 @@ from contactsafe.learning.vec_env import EncodedVecEnv  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.dither import Dither  # noqa: E402
 from contactsafe.policy.observation import ObservationScaling  # noqa: E402
+from contactsafe.tasks.wiping.observation import POSE  # noqa: E402
 
-SCALING = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
+SCALING = ObservationScaling.from_statistics([POSE], np.zeros(128), np.ones(128))
 
 
 def no_perception(masks, poses):
@@ -65,7 +66,7 @@ def test_a_clean_board_is_an_end():
     assert infos[1]["TimeLimit.truncated"] is False
     assert infos[1]["is_success"] is True
     assert reward[1] > 0.0
-    assert adapter.finished[0]["ink_left"] == 0.0
+    assert adapter.finished[0]["ink_removed"] == 1.0
     assert adapter.finished[0]["reward_ink"] == pytest.approx(reward[1])
 
 

@@ -17,21 +17,30 @@ from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
-from contactsafe.policy.bundle import Bundle, digest  # noqa: E402
+from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402
-from contactsafe.policy.observation import ObservationScaling  # noqa: E402
+from contactsafe.policy.manifest import digest  # noqa: E402
+from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
 from contactsafe.policy.operators import RULES  # noqa: E402
 from contactsafe.policy.policy import Policy  # noqa: E402
-from contactsafe.tasks.wiping.tasks import OBSERVED  # noqa: E402
 from contactsafe.vision.log_polar import FEATURES  # noqa: E402
 
 H = camera_homography()
+OBSERVED = {"pose": 6, "target": 18, "force": 3}
+POSE = Observation("pose", (0.5, 0.0, 0.01, 0.0, 0.0, 0.0), (0.15, 0.15, 0.03, 0.1, 0.1, 0.1))
+
+
+def listed(names):
+    return [{"name": name, "size": OBSERVED[name]} for name in names]
+
+
 DESCRIPTION = {
+    "task": "wiping",
     "representation": "tool",
     "window_m": 0.64,
     "view_size": 32,
     "latent_size": 128,
-    "observes": ["pose"],
+    "observes": listed(["pose"]),
     "rate_hz": 60.0,
     "action_repeat": 1,
     "dither": {"amplitude": 0.0},
@@ -44,7 +53,7 @@ def networks():
     torch.manual_seed(0)
     layers = torch.nn.Sequential(torch.nn.Linear(134, 16), torch.nn.Tanh(), torch.nn.Linear(16, 18))
     torch.nn.init.normal_(layers[-1].weight, std=2.0)
-    scaling = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
+    scaling = ObservationScaling.from_statistics([POSE], np.zeros(128), np.ones(128))
     return VAE(EncoderConfig(size=32, channels=(4, 4, 8))), layers, scaling
 
 
@@ -140,8 +149,8 @@ def log_polar_bundle(folder, observes):
     k = sum(OBSERVED[name] for name in observes)
     layers = torch.nn.Sequential(torch.nn.Linear(k + FEATURES, 18))
     scaling = ObservationScaling(observes, (0.0,) * (k + FEATURES), (1.0,) * (k + FEATURES))
-    encoder = {"representation": "log_polar", "view_size": 128, "latent_size": FEATURES, "observes": observes}
-    return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **encoder})
+    encoder = {"representation": "log_polar", "view_size": 128, "latent_size": FEATURES}
+    return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **encoder, "observes": listed(observes)})
 
 
 def test_log_polar_needs_no_encoder_and_the_scale_of_a_homography_says_nothing(tmp_path):

@@ -37,7 +37,7 @@ class PolicyConfig:
 
     Attributes:
         encoder: folder of the vision encoder that `contactsafe train vae` leaves (encoder.json, and encoder.onnx where
-            it is learned); not read for a task without camera.
+            it is learned); not read for a task without camera, and from Python None for a policy that sees no images.
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         task: what is learned; from Python, any name for the environments that are handed over.
@@ -65,7 +65,7 @@ class PolicyConfig:
 
     algorithm: ClassVar[str]
 
-    encoder: Path = Path("runs/vae")
+    encoder: Path | None = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
     task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK

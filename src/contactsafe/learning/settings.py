@@ -99,7 +99,7 @@ def _replaced(config: Any, values: Mapping[str, Any]) -> Any:
     def typed(now: Any, value: Any) -> Any:
         if dataclasses.is_dataclass(now):
             return _replaced(now, value)
-        return type(now)(value) if isinstance(now, tuple | Path) else value
+        return type(now)(value) if isinstance(now, tuple | Path) and value is not None else value
 
     known = [field.name for field in dataclasses.fields(config) if field.name in values]
     return dataclasses.replace(config, **{name: typed(getattr(config, name), values[name]) for name in known})

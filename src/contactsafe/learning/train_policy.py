@@ -23,7 +23,7 @@ from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling, chosen
 from contactsafe.policy.perception import NO_IMAGE
 from contactsafe.policy.policy import Policy
-from contactsafe.tasks import task_by_name
+from contactsafe.tasks import TASKS, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
 
 MakeEnv = Callable[[int], Any]
@@ -41,7 +41,7 @@ def train_policy(
     Args:
         config: settings of some algorithm, such as PpoConfig.
         make_env: makes the environments; None for those of config.task, as `contactsafe train` makes them. They have
-            `observation_vectors`, and where they show a mask `camera_homography`.
+            `observation_vectors`, and where the policy sees their mask `camera_homography`.
         make_held_out: the same for the evaluation; None takes make_env, or the task's where that is None.
 
     Returns:
@@ -54,8 +54,9 @@ def train_policy(
     if make_env is None:
         make_env, usual_held_out = _environments(config)
         make_held_out = make_held_out or usual_held_out
+    encoder = _encoder(config)
     with run_folder(config.out, config.resume) as out:
-        return _train(config, make_env, make_held_out or make_env, out)
+        return _train(config, encoder, make_env, make_held_out or make_env, out)
 
 
 def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
@@ -65,13 +66,19 @@ def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
     return lambda n: entry.make_vec(n, training), lambda n: entry.make_vec(n, nominal)
 
 
-def _train(config: PolicyConfig, make_env: MakeEnv, make_held_out: MakeEnv, out: Path) -> dict[str, Any]:
+def _encoder(config: PolicyConfig) -> VisionEncoder | None:
+    """Load the vision encoder; None where the policy is to see no images."""
+    blind = config.encoder is None or (config.task in TASKS and not TASKS[config.task].has_camera)
+    return None if blind else VisionEncoder.load(config.encoder)
+
+
+def _train(
+    config: PolicyConfig, encoder: VisionEncoder | None, make_env: MakeEnv, make_held_out: MakeEnv, out: Path
+) -> dict[str, Any]:
+    state = load_run(config, encoder.digest if encoder else "") if config.resume else None
     torch.set_num_threads(config.threads)
-    env = raw_env = make_env(config.num_envs)
+    env = encoded(make_env(config.num_envs), encoder, config)
     try:
-        encoder = VisionEncoder.load(config.encoder) if _sees(raw_env) else None
-        state = load_run(config, encoder.digest if encoder else "") if config.resume else None
-        env = encoded(raw_env, encoder, config)
         model, effort = _learn(config, env, encoder, state)
     finally:
         env.close()
@@ -89,11 +96,6 @@ def _train(config: PolicyConfig, make_env: MakeEnv, make_held_out: MakeEnv, out:
     return description["results"]
 
 
-def _sees(env: Any) -> bool:
-    """Tell whether an environment shows images."""
-    return "mask" in env.single_observation_space.spaces
-
-
 def _homography(env: Any) -> Any:
     return getattr(getattr(env, "unwrapped", env), "camera_homography", None)
 
@@ -103,7 +105,7 @@ def encoded(raw_env: Any, encoder: VisionEncoder | None, config: PolicyConfig) -
 
     Args:
         raw_env: the task's.
-        encoder: of its images; None where it shows none.
+        encoder: of its masks; None where the policy is to see none.
         config: the settings.
     """
     vectors = chosen(getattr(raw_env, "unwrapped", raw_env).observation_vectors, config.observes)

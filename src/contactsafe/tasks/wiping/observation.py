@@ -23,11 +23,4 @@ FORCE = Observation(
 
 def observation_vectors(action: ActionConfig) -> tuple[Observation, ...]:
     """Return the vectors, in the order of the observation."""
-    return POSE, _LEGACY, FORCE
-
-
-_LEGACY = Observation(
-    "target",
-    (*6 * [0.0], *3 * [150.0], *3 * [450.0], *3 * [25.0], *3 * [42.0]),
-    (0.03, 0.03, 0.01, 0.03, 0.03, 0.03, *3 * [60.0], *3 * [150.0], *3 * [8.0], *3 * [10.0]),
-)
+    return POSE, target_observation(action), FORCE
