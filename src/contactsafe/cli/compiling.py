@@ -37,7 +37,9 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
     for word in joints:
         if not word.isdecimal() or not 1 <= int(word) <= MOST_JOINTS:
             raise InvalidInputError(f"joints = {word}; give numbers from 1 to {MOST_JOINTS}, such as 6,7")
-    found = {f"controller, {word} joints": partial(_control, int(word)) for word in joints}
+    found: dict[str, Callable[[], object]] = {
+        f"controller, {word} joints": partial(_control, int(word)) for word in joints
+    }
     found["worlds"] = _run_worlds
     for entry in TASKS.values():
         found |= {f"{entry.name}{what}": run for what, run in _of_task(entry).items()}
@@ -47,7 +49,7 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
 def _of_task(entry: TaskEntry) -> dict[str, Callable[[], object]]:
     """Return the runs that compile all variants of a task, by what follows its name."""
     task = entry.task
-    runs = {
+    runs: dict[str, Callable[[], object]] = {
         "": partial(_do, entry, task.training_config(False)),
         ", randomised": partial(_do, entry, task.training_config(True)),
     }

@@ -5,13 +5,23 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.learning.checking import CheckpointError, entry
 from contactsafe.learning.checkpoints import CHECKPOINT, load_checkpoint, refused_as
 
-Config = TypeVar("Config")
+
+class _Runs(Protocol):
+    """Settings of a run, which name its folder."""
+
+    @property
+    def out(self) -> Path:
+        """The folder."""
+        ...
+
+
+Config = TypeVar("Config", bound=_Runs)
 
 NOT_TAKEN_OVER = ("out", "resume", "max_minutes")
 """Settings that a run which goes on does not take over from the session before."""

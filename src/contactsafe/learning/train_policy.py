@@ -68,8 +68,9 @@ def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
 
 def _encoder(config: PolicyConfig) -> VisionEncoder | None:
     """Load the vision encoder; None where the policy is to see no images."""
-    blind = config.encoder is None or (config.task in TASKS and not TASKS[config.task].has_camera)
-    return None if blind else VisionEncoder.load(config.encoder)
+    if config.encoder is None or (config.task in TASKS and not TASKS[config.task].has_camera):
+        return None
+    return VisionEncoder.load(config.encoder)
 
 
 def _train(
@@ -139,7 +140,7 @@ def _describe(
     config: PolicyConfig, env: EncodedVecEnv, encoder: VisionEncoder | None, effort: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what the bundle says of a policy beside its models."""
-    spaces = env.env.single_observation_space
+    spaces: Any = env.env.single_observation_space
     training: dict[str, Any] = {config.algorithm: _portable(plain(config))}
     image: dict[str, Any] = {"representation": NO_IMAGE, "latent_size": 0}
     if encoder is not None:

@@ -97,7 +97,7 @@ class EncodedVecEnv(Independent, VecEnv):
         self._seed = None
         self._tally = {}
         self._steps[:] = 0
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         return self._encode(observation)
 
     def step_async(self, actions: np.ndarray) -> None:

@@ -131,6 +131,11 @@ class Perception(Independent):
                     f"masks are {views.dtype} of shape {views.shape}; "
                     f"this encoder takes uint8 (N, {self.size}, {self.size})"
                 )
+        return self._encode(views)
+
+    def _encode(self, views: np.ndarray) -> np.ndarray:
+        if self.session is None:
+            raise InvalidInputError(f"representation '{self.representation}' needs an encoder, and session is None")
         return self.session.run(["latent"], {"mask": views})[0]
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """What the wiping task lets its policies observe besides the mask, and at which scale."""
 
 from contactsafe.policy.action_config import ActionConfig
-from contactsafe.policy.observation import Observation
+from contactsafe.policy.observation import Observation, target_observation
 
 POSE = Observation(
     "pose",
