@@ -24,7 +24,7 @@ WHOLE_STEP = 16  # ticks
 def wipe(engine, boards, seed):
     """Let the policy wipe, and give each board's steps until it is clean: peak and mean force, ticks in contact."""
     env = make_engine(engine, boards, WipingConfig())
-    policy = Policy(shipped_bundle(), env.unwrapped.camera_homography)
+    policy = Policy(shipped_bundle("wiping"), env.unwrapped.camera_homography)
     observation, _ = env.reset(seed=seed)
     tasks, alive = env.unwrapped.tasks, np.ones(boards, bool)
     found = [[] for _ in range(boards)]

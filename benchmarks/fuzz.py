@@ -23,8 +23,8 @@ import numpy as np
 
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.policy import graph
-from contactsafe.policy.bundle import MANIFEST, POLICY, blank_observation, digest, shipped_bundle
-from contactsafe.policy.observation import OBSERVED
+from contactsafe.policy.bundle import POLICY, blank_observation, shipped_bundle
+from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.policy.operators import RULES
 from contactsafe.policy.policy import Policy
 
@@ -250,9 +250,9 @@ def try_bundle(folder: Path) -> None:
     """Load a bundle and let it act, as a robot would."""
     policy = Policy(folder, HOMOGRAPHY)
     rng = np.random.default_rng(0)
-    seen = blank_observation(policy.bundle.manifest, 2)
+    seen = blank_observation(policy.bundle, 2)
     seen["mask"][rng.random(seen["mask"].shape) < 0.02] = 0
-    seen |= {name: rng.normal(size=(2, size)) for name, size in OBSERVED.items()}
+    seen |= {name: rng.normal(size=(2, size)) for name, size in policy.bundle.observes.items()}
     action = policy.act(seen)
     assert action.shape == (2, 18)
     assert np.isfinite(action).all()
@@ -263,7 +263,7 @@ def bundles(seed: int, items: range):
     """Damage and try so many bundles; yield number, way and what came of it."""
     for i in items:
         with tempfile.TemporaryDirectory() as place:
-            folder = shutil.copytree(shipped_bundle(), Path(place) / "bundle")
+            folder = shutil.copytree(shipped_bundle("wiping"), Path(place) / "bundle")
             way = damage_bundle(folder, random.Random(f"{seed} {i}"))
             yield i, way, outcome(lambda folder=folder: try_bundle(folder))
 
@@ -277,11 +277,13 @@ def checkpoints(seed: int, items: range):
     import torch
 
     from contactsafe.learning.algorithms import PpoConfig, SacConfig
-    from contactsafe.learning.checkpoints import CHECKPOINT, load_checkpoint, pack, save_checkpoint, unpack
+    from contactsafe.learning.checkpoints import CHECKPOINT, load_checkpoint, save_checkpoint
+    from contactsafe.learning.packing import pack, unpack
     from contactsafe.learning.run import Run, load_run
-    from contactsafe.learning.train_policy import _encoded, _Eyes
+    from contactsafe.learning.train_policy import encoded
     from contactsafe.learning.train_vae import VaeConfig, train_vae
-    from contactsafe.tasks.wiping.randomisation import Randomisation
+    from contactsafe.learning.vision_encoder import VisionEncoder
+    from contactsafe.sim.randomisation import Randomisation
     from contactsafe.tasks.base.pushes import Pushes
     from contactsafe.tasks.wiping.config import WipingConfig
 
@@ -295,18 +297,18 @@ def checkpoints(seed: int, items: range):
 
     def set_up(kind, **more):
         config = kind(
-            vae=place / "vae", out=place / kind.algorithm, num_envs=2, rollout_steps=8, batch=8, net=(8, 8), **more
+            encoder=place / "vae", out=place / kind.algorithm, num_envs=2, rollout_steps=8, batch=8, net=(8, 8), **more
         )
         config.out.mkdir()
-        env = _encoded(make_env(), eyes, config)
+        env = encoded(make_env(), encoder, config)
         model = config.make_model(env)
-        run = Run(config, model, env, eyes.digest)
+        run = Run(config, model, env, encoder.digest)
         model.learn(24, log_interval=None)
         run.save(1.0)
         return config, run, load_checkpoint(config.out), (config.out / "replay.bin")
 
     def go_on(config, run):
-        run.restore(load_run(config, eyes.digest))
+        run.load_state_dict(load_run(config, encoder.digest))
         for _ in range(3):
             run.env.step(np.zeros((2, 18), np.float32))
         run.model.learn(8, log_interval=None, reset_num_timesteps=False)
@@ -315,7 +317,7 @@ def checkpoints(seed: int, items: range):
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         train_vae(VaeConfig(out=place / "vae", held_out=16), sample_masks, HOMOGRAPHY)
-        eyes = _Eyes.load(place / "vae")
+        encoder = VisionEncoder.load(place / "vae")
         runs = [
             set_up(PpoConfig, epochs=1),
             set_up(SacConfig, buffer=64, learning_starts=4, update_every=2, gradient_steps=1, action_repeat=1),

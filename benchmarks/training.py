@@ -3,7 +3,7 @@
     python benchmarks/training.py [rollouts]
 
 It takes the time of rollouts and updates as training runs them, without writing checkpoints. The clock on the wall
-splits each step into worlds, eyes, policy and bookkeeping, and update; then the worlds' processor time is split by
+splits each step into worlds, encoder, policy and bookkeeping, and update; then the worlds' processor time is split by
 running their parts alone. Networks and boards are those of a beginner, who spends much time in contact.
 """
 
@@ -20,13 +20,14 @@ from stable_baselines3.common.callbacks import BaseCallback
 from contactsafe.core.compiled import compiled
 from contactsafe.learning.algorithms import PpoConfig
 from contactsafe.learning.vec_env import EncodedVecEnv
-from contactsafe.policy.dither import Scan
+from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
 from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
 from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
 from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
+from contactsafe.tasks import WIPING
 from contactsafe.tasks.wiping.config import WipingConfig
 
 ROLLOUTS = 6
@@ -63,13 +64,13 @@ def timed(owner, name, spent):
 
 
 def make(config):
-    """Make the environment as `contactsafe train` does, on foveated eyes whose statistics do not matter here."""
+    """Make the environment as `contactsafe train` does, on log-polar features whose statistics do not matter here."""
     task = WipingConfig(randomisation=Randomisation.broad())
-    raw = gymnasium.make_vec(config.env_id, num_envs=config.num_envs, config=task)
-    perception = Perception(None, "foveated", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
+    raw = gymnasium.make_vec(WIPING, num_envs=config.num_envs, config=task)
+    perception = Perception(None, "log_polar", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
     zeros = np.zeros(perception.latent_size)
-    scaling = ObservationScaling.from_statistics(config.observes, zeros, zeros + 1.0)
-    return EncodedVecEnv(raw, perception, scaling, scan=Scan(config.scan))
+    scaling = ObservationScaling.from_statistics(raw.unwrapped.observation_vectors, zeros, zeros + 1.0)
+    return EncodedVecEnv(raw, perception, scaling, dither=Dither(config.dither))
 
 
 @compiled
@@ -135,7 +136,7 @@ def main() -> None:
         parts = {
             "worlds, in threads": spent["in_threads"],
             "resets, observations, rewards": spent["step"] - spent["in_threads"],
-            "eyes, in threads": spent["perception"],
+            "encoder, in threads": spent["perception"],
             "policy and bookkeeping": clock.rollouts - spent["step"] - spent["perception"],
             "update": whole - clock.rollouts,
         }

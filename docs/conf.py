@@ -42,7 +42,7 @@ apidoc_modules = [
     {
         "path": "../src/contactsafe",
         "destination": "api",
-        "exclude_patterns": ["../src/contactsafe/cli.py", "../src/contactsafe/__main__.py"],
+        "exclude_patterns": ["../src/contactsafe/cli", "../src/contactsafe/__main__.py"],
         "separate_modules": True,
         "module_first": True,
         "max_depth": 1,

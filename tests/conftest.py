@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture(scope="session")
-def vae(tmp_path_factory):
+def encoder(tmp_path_factory):
     """Folder of a small encoder, hardly trained."""
     pytest.importorskip("torch")
     from contactsafe.learning.encoder import EncoderConfig

@@ -18,10 +18,10 @@ from contactsafe.core.parse import parse
 from contactsafe.experiments.config import PLANTS
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.tasks.wiping.drawings import BOARDS
-from contactsafe.tasks import ENGINES
-from contactsafe.tasks.base.evaluation import FIGURES
+from contactsafe.sim.drawings import BOARDS
+from contactsafe.tasks import ENGINES, TASKS
 from contactsafe.tasks.wiping.config import ImageSource
+from contactsafe.tasks.wiping.figures import FIGURES
 from contactsafe.tasks.wiping.scripted import SCRIPTED
 
 UNKNOWN = "--{}: 'best' is unknown; choose from vices, paper, safe; see contactsafe {} --help"
@@ -40,7 +40,7 @@ def mistake(capsys, *words):
 
 @pytest.fixture
 def bundle(tmp_path):
-    return shutil.copytree(shipped_bundle(), tmp_path / "bundle")
+    return shutil.copytree(shipped_bundle("wiping"), tmp_path / "bundle")
 
 
 def test_help_lists_every_command_with_what_it_does(capsys):
@@ -67,9 +67,7 @@ def test_training_has_help_of_its_own(kind, capsys):
     assert main(["train", kind, "--help"]) == 0
     out = capsys.readouterr().out
     assert "--resume" in out
-    chosen = (
-        ["{foveated,tool,paper}"] if kind == "vae" else [f"{{{','.join(ENGINES.values())}}}", "{pose,target,force}"]
-    )
+    chosen = [f"--task {{{','.join(TASKS)}}}", *(["{log_polar,tool,paper}"] if kind == "vae" else [])]
     assert all(names in out for names in chosen)
     assert not re.search(r"\bSTR\b|None", out)
 
@@ -87,6 +85,7 @@ def test_training_has_help_of_its_own(kind, capsys):
                 "--image-source": get_args(ImageSource),
                 "--engine": ENGINES,
                 "--scripted": SCRIPTED,
+                "--task": TASKS,
             },
         ),
         ("bench", {}),
@@ -143,7 +142,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
     [
         (
             "evaluate --seed abc",
-            "--seed: 'abc' is not a whole number; --seed INT of boards, starts and noise. (default: 0); "
+            "--seed: 'abc' is not a whole number; --seed INT of episodes and noise. (default: 0); "
             "see contactsafe evaluate --help",
         ),
         ("bench --fast", "unknown: --fast; see contactsafe bench --help"),
@@ -179,8 +178,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         ),
         (
             "evaluate --scripted oracle",
-            "--scripted: 'oracle' is unknown; choose from raster, nearest-ink, random; "
-            "see contactsafe evaluate --help",
+            "--scripted: 'oracle' is unknown; choose from raster, nearest-ink, random; see contactsafe evaluate --help",
         ),
         ("evaluate --seed", "--seed: its value is missing; see contactsafe evaluate --help"),
     ],
@@ -196,12 +194,12 @@ def test_a_word_in_place_of_a_number_or_nothing_is_told_plainly(capsys):
     assert capsys.readouterr().err.startswith("contactsafe: --trials: 'x' is not a whole number; ")
 
 
-def test_a_task_that_gymnasium_does_not_know_is_told_in_one_line(capsys):
+def test_a_task_that_does_not_exist_is_told_in_one_line(capsys):
     pytest.importorskip("torch")
-    assert main(["train", "ppo", "--env-id", "CartPole-v1"]) == 2
+    assert main(["train", "ppo", "--task", "cartpole"]) == 2
     assert capsys.readouterr().err == (
-        "contactsafe: --env-id: 'CartPole-v1' is unknown; choose from contactsafe/Wiping-v0, "
-        "contactsafe/WipingBullet-v0; see contactsafe train ppo --help\n"
+        f"contactsafe: --task: 'cartpole' is unknown; choose from {', '.join(TASKS)}; "
+        "see contactsafe train ppo --help\n"
     )
 
 
@@ -259,7 +257,7 @@ def test_a_damaged_bundle_is_told_and_nothing_is_written(bundle, tmp_path, capsy
     assert not (tmp_path / "out").exists()
 
 
-def test_a_bundle_and_a_reference_are_one_too_many(bundle, capsys):
+def test_a_bundle_and_a_scripted_policy_are_one_too_many(bundle, capsys):
     told = mistake(capsys, "evaluate", str(bundle), "--scripted", "raster")
     assert told == "a bundle and --scripted raster are both given; name one"
 
@@ -281,10 +279,11 @@ def test_a_run_without_a_bundle_is_told_how_to_leave_one(named, tmp_path, capsys
     )
 
 
-def test_eyes_in_place_of_a_policy_are_told(tmp_path, capsys):
-    (tmp_path / "vae.json").write_text("{}")
+def test_an_encoder_in_place_of_a_policy_is_told(tmp_path, capsys):
+    (tmp_path / "encoder.json").write_text("{}")
     assert mistake(capsys, "evaluate", str(tmp_path)) == (
-        f"{tmp_path} holds eyes, not a policy; run `contactsafe train ppo --vae {tmp_path}`, which leaves a bundle"
+        f"{tmp_path} holds a vision encoder, not a policy; "
+        f"run `contactsafe train ppo --encoder {tmp_path}`, which leaves a bundle"
     )
 
 
@@ -324,7 +323,7 @@ def test_collisions_need_no_bundle_and_leave_page_summary_and_a_row_a_trial(tmp_
     def load(*_):
         pytest.fail("a bundle was asked for")
 
-    monkeypatch.setattr("contactsafe.cli.Bundle.load", load)
+    monkeypatch.setattr("contactsafe.policy.bundle.Bundle.load", load)
     words = "experiment collisions --trials 2 --controllers vices,safe --seed 4 --out"
     assert main([*words.split(), str(tmp_path)]) == 0
     out, err = capsys.readouterr()
@@ -361,12 +360,12 @@ def test_evaluate_says_how_the_policy_did(bundle, capsys):
     assert main(["evaluate", str(bundle), "--episodes", "2", "--seed", "3", "--json"]) == 0
     results = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert results["seed"] == 3
-    assert len(results["boards"]) == 2
+    assert len(results["records"]) == 2
 
 
 def test_evaluate_explains_every_figure_it_prints(bundle, capsys):
     assert main(["evaluate", str(bundle), "--episodes", "1", "--seed", "3"]) == 0
     asked, *rows = capsys.readouterr().out.splitlines()
-    assert asked.startswith(f"policy {bundle}, seed 3, controller safe, boards strokes")
-    assert [row.split()[0] for row in rows] == list(FIGURES)
-    assert all(FIGURES[row.split()[0]] in row for row in rows)
+    assert asked.startswith(f"task wiping, policy {bundle}, seed 3, controller safe, boards strokes")
+    assert [row.split()[0] for row in rows] == [figure.name for figure in FIGURES]
+    assert all(figure.doc in row for figure, row in zip(FIGURES, rows, strict=True))

@@ -38,7 +38,7 @@ from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.env import WipingEnv
 from contactsafe.tasks.wiping.sampling import MaskSampler
-from contactsafe.tasks.wiping.scripted import Chance, NearestInk, Raster
+from contactsafe.tasks.wiping.scripted import NearestInk, RandomPolicy, Raster
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 VARIED = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes())
@@ -232,9 +232,11 @@ def encoded():
     from contactsafe.policy.observation import ObservationScaling
 
     made = envs()
-    eyes = Perception(None, "foveated", 0.64, 128, made.camera_homography, share=True)
-    scaling = ObservationScaling(("pose",), (0.0,) * (6 + eyes.latent_size), (1.0,) * (6 + eyes.latent_size))
-    made = EncodedVecEnv(made, eyes, scaling)
+    perception = Perception(None, "log_polar", 0.64, 128, made.camera_homography, threaded=True)
+    scaling = ObservationScaling(
+        ("pose",), (0.0,) * (6 + perception.latent_size), (1.0,) * (6 + perception.latent_size)
+    )
+    made = EncodedVecEnv(made, perception, scaling)
     made.reset()
     return made
 
@@ -245,7 +247,7 @@ def step_encoded(vec_env):
 
 def photographed():
     pytest.importorskip("cv2")
-    return tasks(WipingConfig(sight="photograph"))
+    return tasks(WipingConfig(image_source="photograph"))
 
 
 def photographer():
@@ -287,13 +289,13 @@ ACTORS = {
     "Playback": (begun(playback, play), play),
     "LateWorlds": (begun(late_worlds, run_worlds), run_worlds),
     "LatePlayback": (begun(late_playback, play), play),
-    "Bundle": (lambda: Bundle.load(shipped_bundle()), infer),
-    "Policy": (begun(lambda: Policy(shipped_bundle(), homography()), act), act),
-    "Perception": (lambda: Perception(None, "foveated", 0.64, 128, homography(), share=True), perceive),
+    "Bundle": (lambda: Bundle.load(shipped_bundle("wiping")), infer),
+    "Policy": (begun(lambda: Policy(shipped_bundle("wiping"), homography()), act), act),
+    "Perception": (lambda: Perception(None, "log_polar", 0.64, 128, homography(), threaded=True), perceive),
     "EncodedVecEnv": (begun(encoded, step_encoded), step_encoded),
     "Raster": (begun(lambda: Raster(VARIED, 2), lambda r: [r.act(observation())]), lambda r: [r.act(observation())]),
     "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
-    "Chance": (lambda: Chance(2, 0), lambda r: [r.act(observation())]),
+    "RandomPolicy": (lambda: RandomPolicy(2, 0), lambda r: [r.act(observation())]),
     "Threads": (begun(lambda: Threads(2), share), share),
     "Run": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
     "Plotter": (plotter, lambda p: [p._count]),

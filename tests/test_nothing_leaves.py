@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 LOAD = """
 import time
 from contactsafe.policy.bundle import Bundle, shipped_bundle
-Bundle.load(shipped_bundle())
+Bundle.load(shipped_bundle("wiping"))
 time.sleep(1.0)
 """
 
@@ -96,7 +96,7 @@ small = ["--num-envs", "2", "--rollout-steps", "4", "--batch", "8", "--total-ste
 assert main(["evaluate", "--episodes", "1"]) == 0
 assert main(["experiment", "disturbance", "--trials", "1", "--controllers", "vices", "--out", "page"]) == 0
 assert main(["train", "vae", "--held-out", "8", "--out", "runs/vae"]) == 0
-assert main(["train", "ppo", "--vae", "runs/vae", "--out", "runs/ppo", *small]) == 0
+assert main(["train", "ppo", "--encoder", "runs/vae", "--out", "runs/ppo", *small]) == 0
 """
     ended = run_without_sockets(code, environment, places["here"])
     assert ended.returncode == 0, ended.stderr[-2000:]

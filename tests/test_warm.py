@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from contactsafe.cli import main
+from contactsafe.cli.compiling import steps
 from contactsafe.core.compiled import ANNOUNCEMENT
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.warmup import steps
 
 SIX = Path(__file__).parents[1] / "examples" / "own_scene.xml"
 

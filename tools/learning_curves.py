@@ -18,13 +18,13 @@ SHARE = 0.9
 
 
 def curve(run: Path) -> dict[str, list[float]]:
-    """Read a run's log: minutes, steps, share of boards cleared, share of ink left."""
+    """Read a run's log: minutes, steps, fraction of boards cleared, fraction of ink left."""
     first = EPISODE_STEPS * json.loads((run / "config.json").read_text(encoding="utf-8"))["num_envs"]
     log = EventAccumulator(str(run))
     log.Reload()
     minutes = {event.step: event.value for event in log.Scalars("time/minutes")}
     cleared = {event.step: event.value for event in log.Scalars("episode/success")}
-    left = {event.step: event.value for event in log.Scalars("episode/ink_left")}
+    left = {event.step: 1.0 - event.value for event in log.Scalars("episode/ink_removed")}
     steps = sorted(step for step in cleared if step > first)
     return {
         "steps": steps,

@@ -5,7 +5,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from contactsafe.sim.snapshot import Part, of_array, of_generators, put, take
+from contactsafe.core.state import Entry, load_state_dict, of_array, of_generators, state_dict
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.tasks.wiping.figures import EPISODE_METRICS, FIGURES
+from contactsafe.tasks.wiping.observation import observation_vectors
 
 BOARD = np.array([0.5, 0.0])
 INK_SIDE_M = 0.30
@@ -87,6 +90,9 @@ class FakeWiping(VectorEnv):
     """A pad that glides over the board at once to where it is told; SAME_STEP autoreset, as the real task has it."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    observation_vectors = observation_vectors(ActionConfig())
+    episode_metrics = EPISODE_METRICS
+    figures = FIGURES
 
     def __init__(self, num_envs=4, max_steps=60):
         self.num_envs = num_envs
@@ -112,12 +118,12 @@ class FakeWiping(VectorEnv):
             self._reset_one(i)
         return self._observe(), self._info(np.zeros(self.num_envs), np.zeros(self.num_envs))
 
-    def _parts(self):
+    def state_entries(self):
         return {
             "rngs": of_generators(self.rngs),
             "xy": of_array(self.xy),
             "steps": of_array(self.steps),
-            "boards": Part(lambda: [{**vars(board)} for board in self.boards], self._set_boards),
+            "boards": Entry(lambda: [{**vars(board)} for board in self.boards], self._set_boards),
         }
 
     def _set_boards(self, values):
@@ -125,13 +131,13 @@ class FakeWiping(VectorEnv):
         for board, value in zip(self.boards, values, strict=True):
             vars(board).update(value)
 
-    def snapshot(self):
+    def state_dict(self):
         """All that decides the future."""
-        return take(self._parts())
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot):
+    def load_state_dict(self, state):
         """Put it back."""
-        put(self._parts(), snapshot)
+        load_state_dict(self.state_entries(), state)
 
     def _reset_one(self, i):
         self.boards[i] = Board(self.rngs[i], strokes=1)
@@ -192,8 +198,8 @@ class FakeWiping(VectorEnv):
         return self._observe(), ink + approach, terminated, truncated, info
 
 
-class SightedWiping(FakeWiping):
-    """The same, with the way to the nearest ink where the pose has its rotation: no eyes needed."""
+class GuidedWiping(FakeWiping):
+    """The same, with the direction of the nearest ink where the pose has its rotation: no encoder needed."""
 
     def _observe(self):
         seen = super()._observe()

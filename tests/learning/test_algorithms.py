@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 
 from stable_baselines3 import TD3  # noqa: E402
 from stable_baselines3.common.noise import NormalActionNoise  # noqa: E402
-from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
+from tests.learning.fakes import FakeWiping, GuidedWiping  # noqa: E402
 
 from contactsafe.core.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import ALGORITHMS, PpoConfig, SacConfig  # noqa: E402
@@ -22,7 +22,6 @@ from contactsafe.learning.replay import ReplayFile  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.observation import ObservationScaling  # noqa: E402
-from contactsafe.tasks.wiping.tasks import OBSERVED  # noqa: E402
 
 SMALL = {
     "num_envs": 4,
@@ -53,14 +52,14 @@ class Td3Config(PolicyConfig):
         return model.actor.mu
 
 
-def test_a_time_limit_is_no_end_to_an_off_policy_algorithm_either(vae, tmp_path, monkeypatch):
+def test_a_time_limit_is_no_end_to_an_off_policy_algorithm_either(encoder, tmp_path, monkeypatch):
     """The memory knows it for what it is, and the value behind it counts."""
     models = []
     make_model = SacConfig.make_model
     monkeypatch.setattr(SacConfig, "make_model", lambda self, env: models.append(make_model(self, env)) or models[0])
     monkeypatch.setattr("contactsafe.learning.train_policy.export_bundle", lambda *args, **options: None)
     config = SacConfig(
-        vae=vae, out=tmp_path / "run", buffer=512, learning_starts=512, **{**SMALL, "evaluate_episodes": 0}
+        encoder=encoder, out=tmp_path / "run", buffer=512, learning_starts=512, **{**SMALL, "evaluate_episodes": 0}
     )
     train_policy(config, lambda n: FakeWiping(n, max_steps=9))
     memory = models[0].replay_buffer
@@ -73,20 +72,20 @@ def test_a_time_limit_is_no_end_to_an_off_policy_algorithm_either(vae, tmp_path,
     [SacConfig(buffer=512, learning_starts=64, **SMALL), Td3Config(**SMALL), PpoConfig(epochs=1, **SMALL)],
     ids=lambda config: config.algorithm,
 )
-def test_the_bundle_acts_as_the_model_does(config, vae, tmp_path, monkeypatch):
+def test_the_bundle_acts_as_the_model_does(config, encoder, tmp_path, monkeypatch):
     models = []
     make_model = type(config).make_model
     monkeypatch.setattr(type(config), "make_model", lambda self, env: models.append(make_model(self, env)) or models[0])
-    config = dataclasses.replace(config, vae=vae, out=tmp_path / "run")
+    config = dataclasses.replace(config, encoder=encoder, out=tmp_path / "run")
     train_policy(config, FakeWiping)
     bundle = Bundle.load(config.out / "bundle")
     assert bundle.manifest["training"][config.algorithm]["batch"] == 32
     assert bundle.manifest["training"]["steps"] == 256
     assert bundle.manifest["results"]["episodes"] == 4
     rng = np.random.default_rng(0)
-    seen = {name: rng.normal(size=(9, k)).astype(np.float32) for name, k in OBSERVED.items()}
+    seen = {name: rng.normal(size=(9, k)).astype(np.float32) for name, k in bundle.observes.items()}
     latent = rng.normal(size=(9, 128)).astype(np.float32)
-    observes = bundle.manifest["observes"]
+    observes = tuple(bundle.observes)
     scaling = ObservationScaling(observes, **bundle.manifest["observation_scaling"])
     wanted, _ = models[0].predict(scaling(seen, latent), deterministic=True)
     state = np.concatenate([seen[name] for name in observes], axis=1)
@@ -95,23 +94,23 @@ def test_the_bundle_acts_as_the_model_does(config, vae, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_sac_learns_to_go_where_the_ink_is(vae, tmp_path):
+def test_sac_learns_to_go_where_the_ink_is(encoder, tmp_path):
     """Over what it does before the first update; where the last bits of a processor lead it is anybody's guess."""
     config = SacConfig(
-        vae=vae, num_envs=16, rollout_steps=32, batch=128, net=(64, 64),
+        encoder=encoder, num_envs=16, rollout_steps=32, batch=128, net=(64, 64),
         learning_rate=2e-3, learning_starts=1000, buffer=20_000, discount=0.95,
-        evaluate_episodes=16, scan=0.0, observes=("pose",), action_repeat=1, entropy_start=0.1,
+        evaluate_episodes=16, dither=0.0, observes=("pose",), action_repeat=1, entropy_start=0.1,
     )  # fmt: skip
     removed = []
     for steps in (512, 6144):
         trained = dataclasses.replace(config, out=tmp_path / str(steps), total_steps=steps)
-        removed.append(train_policy(trained, lambda n: SightedWiping(n, max_steps=40))["ink_removed_mean"])
+        removed.append(train_policy(trained, lambda n: GuidedWiping(n, max_steps=40))["ink_removed_mean"])
     assert removed[1] > removed[0] + 0.4
 
 
 def test_the_learning_rate_falls_with_absolute_steps():
     rate = PpoConfig(learning_rate=0.1).falling_rate()
-    assert [rate(share) for share in (1.0, 0.5, 0.0)] == pytest.approx([0.1, 0.05, 0.005])
+    assert [rate(left) for left in (1.0, 0.5, 0.0)] == pytest.approx([0.1, 0.05, 0.005])
 
 
 class Memory:

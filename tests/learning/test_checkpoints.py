@@ -25,14 +25,13 @@ from contactsafe.core.files import held  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import (  # noqa: E402
     CHECKPOINT,
-    as_started,
     load_checkpoint,
-    pack,
     save_checkpoint,
-    unpack,
 )
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
+from contactsafe.learning.packing import pack, unpack  # noqa: E402
 from contactsafe.learning.recorder import EventFile  # noqa: E402
+from contactsafe.learning.settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
 
@@ -53,18 +52,18 @@ def no_bundles():
 
 
 @pytest.fixture(scope="module")
-def finished(vae, tmp_path_factory):
+def finished(encoder, tmp_path_factory):
     """Runs of both algorithms: their files."""
     files = {}
     for name, config in CONFIGS.items():
         out = tmp_path_factory.mktemp(name) / "run"
-        train_policy(dataclasses.replace(config, vae=vae, out=out), FakeWiping)
+        train_policy(dataclasses.replace(config, encoder=encoder, out=out), FakeWiping)
         files[name] = {path.name: path.read_bytes() for path in out.iterdir()}
     return files
 
 
 @pytest.fixture
-def run(finished, vae, tmp_path):
+def run(finished, encoder, tmp_path):
     """Put a finished run into a folder; gives the config with which it goes on."""
 
     def put(name):
@@ -72,7 +71,7 @@ def run(finished, vae, tmp_path):
         out.mkdir()
         for file, data in finished[name].items():
             (out / file).write_bytes(data)
-        return dataclasses.replace(CONFIGS[name], vae=vae, out=out, resume=True, total_steps=96)
+        return dataclasses.replace(CONFIGS[name], encoder=encoder, out=out, resume=True, total_steps=96)
 
     return put
 
@@ -136,7 +135,7 @@ def test_a_checkpoint_that_would_run_code_is_refused(run, tmp_path):
 
     config = run("ppo")
     body = io.BytesIO()
-    torch.save({"format": 4, "code": Code()}, body)
+    torch.save({"format": 5, "code": Code()}, body)
     (config.out / CHECKPOINT).write_bytes(sealed(body.getvalue()))
     assert refusal(config) == "cannot be read as a checkpoint; start anew with another --out"
     assert not (tmp_path / "owned").exists()
@@ -281,7 +280,7 @@ def test_rows_of_the_memory_that_were_never_written_are_refused(run, rows):
 def test_a_run_of_another_session_that_is_no_dict_gives_no_settings(run):
     config = run("ppo")
     state = load_checkpoint(config.out)
-    for wrong in ({"net": "x"}, {"vae": []}, {"num_envs": "4"}, {"observes": 3}, {"num_envs": -1}):
+    for wrong in ({"net": "x"}, {"encoder": []}, {"num_envs": "4"}, {"observes": 3}, {"num_envs": -1}):
         save_checkpoint(config.out, {**state, "config": {**state["config"], **wrong}})
         try:
             as_started(config)
@@ -313,9 +312,9 @@ VAE = VaeConfig(
         (lambda s: s.update(epochs_done=True), "epochs_done is True, not int"),
     ],
 )
-def test_eyes_that_go_on_from_what_cannot_be_are_refused(vae, tmp_path, alter, expected):
+def test_an_encoder_that_goes_on_from_what_cannot_be_is_refused(encoder, tmp_path, alter, expected):
     config = dataclasses.replace(VAE, out=tmp_path)
-    state = load_checkpoint(vae)
+    state = load_checkpoint(encoder)
     state["config"].update(images=32, held_out=8)
     alter(state)
     save_checkpoint(tmp_path, state)
@@ -325,7 +324,7 @@ def test_eyes_that_go_on_from_what_cannot_be_are_refused(vae, tmp_path, alter, e
     assert str(error.value) == text
 
 
-def test_the_second_training_in_a_folder_is_refused_and_told_who_the_first_is(run, vae, tmp_path):
+def test_the_second_training_in_a_folder_is_refused_and_told_who_the_first_is(run, encoder, tmp_path):
     config = run("ppo")
     before = load_checkpoint(config.out)["counters"]
     with held(config.out):

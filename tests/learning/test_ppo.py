@@ -11,7 +11,7 @@ pytestmark = pytest.mark.train
 torch = pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from tests.learning.fakes import FakeWiping, SightedWiping  # noqa: E402
+from tests.learning.fakes import FakeWiping, GuidedWiping  # noqa: E402
 
 from contactsafe.core.errors import InvalidInputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig  # noqa: E402
@@ -20,10 +20,11 @@ from contactsafe.learning.recorder import Recorder  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.vec_env import EncodedVecEnv  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
-from contactsafe.policy.dither import Scan  # noqa: E402
+from contactsafe.policy.dither import Dither  # noqa: E402
 from contactsafe.policy.observation import ObservationScaling  # noqa: E402
+from contactsafe.tasks.wiping.observation import POSE  # noqa: E402
 
-SCALING = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
+SCALING = ObservationScaling.from_statistics([POSE], np.zeros(128), np.ones(128))
 
 
 def no_perception(masks, poses):
@@ -65,7 +66,7 @@ def test_a_clean_board_is_an_end():
     assert infos[1]["TimeLimit.truncated"] is False
     assert infos[1]["is_success"] is True
     assert reward[1] > 0.0
-    assert adapter.finished[0]["ink_left"] == 0.0
+    assert adapter.finished[0]["ink_removed"] == 1.0
     assert adapter.finished[0]["reward_ink"] == pytest.approx(reward[1])
 
 
@@ -111,9 +112,9 @@ def test_reward_scale_scales_rewards_and_not_the_log():
     assert plain.finished[0]["return"] == pytest.approx(scaled.finished[0]["return"])
 
 
-def test_the_scan_is_laid_over_the_actions_by_the_step_of_each_episode():
-    scan = Scan(amplitude=0.5, period_s=0.1)
-    env, adapter = make_adapter(scan=scan)
+def test_the_dither_is_laid_over_the_actions_by_the_step_of_each_episode():
+    dither = Dither(amplitude=0.5, period_s=0.1)
+    env, adapter = make_adapter(dither=dither)
     adapter.reset()
     taken, step = [], env.step
     env.step = lambda actions: (taken.append(np.array(actions)), step(actions))[1]
@@ -121,11 +122,11 @@ def test_the_scan_is_laid_over_the_actions_by_the_step_of_each_episode():
         adapter.step(np.zeros((3, 18), np.float32))
     still = np.zeros((3, 18))
     for k, actions in enumerate(taken):
-        np.testing.assert_allclose(actions, scan.over(still, np.full(3, k % 5)), atol=1e-6)
+        np.testing.assert_allclose(actions, dither.over(still, np.full(3, k % 5)), atol=1e-6)
 
 
-def test_exploration_falls_with_the_steps_done(vae, tmp_path):
-    config = ppo_config(vae, tmp_path / "run", total_steps=1000, batch=48, log_std_init=-1.0, log_std_final=-2.0)
+def test_exploration_falls_with_the_steps_done(encoder, tmp_path):
+    config = ppo_config(encoder, tmp_path / "run", total_steps=1000, batch=48, log_std_init=-1.0, log_std_final=-2.0)
     _, adapter = make_adapter()
     model = config.make_model(adapter)
     for steps, wanted in ((0, -1.0), (500, -1.5), (1000, -2.0), (1500, -2.0)):
@@ -145,13 +146,13 @@ def test_what_the_adapter_refuses():
     assert str(error.value) == "action_repeat = 0; give 1 or more"
 
 
-def ppo_config(vae, out, **changes):
+def ppo_config(encoder, out, **changes):
     settings = {"num_envs": 4, "total_steps": 256, "rollout_steps": 16, "batch": 32, "epochs": 2, "net": (16, 16)}
-    return PpoConfig(vae=vae, out=out, **{**settings, "evaluate_episodes": 4, **changes})
+    return PpoConfig(encoder=encoder, out=out, **{**settings, "evaluate_episodes": 4, **changes})
 
 
-def test_trains_resumes_and_ships(vae, tmp_path):
-    config = ppo_config(vae, tmp_path / "run")
+def test_trains_resumes_and_ships(encoder, tmp_path):
+    config = ppo_config(encoder, tmp_path / "run")
     results = train_policy(config, FakeWiping)
     assert results["episodes"] == 4
     state = load_checkpoint(config.out)
@@ -174,17 +175,17 @@ def test_trains_resumes_and_ships(vae, tmp_path):
         train_policy(dataclasses.replace(longer, discount=0.9), FakeWiping)
 
 
-def test_resuming_restores_policy_optimiser_and_chance(vae, tmp_path):
+def test_resuming_restores_policy_optimiser_and_random_numbers(encoder, tmp_path):
     """A finished run, resumed with nothing left to do, exports the policy of its checkpoint."""
-    config = ppo_config(vae, tmp_path / "run", evaluate_episodes=0)
+    config = ppo_config(encoder, tmp_path / "run", evaluate_episodes=0)
     train_policy(config, FakeWiping)
     before = (config.out / "bundle" / "policy.onnx").read_bytes()
     train_policy(dataclasses.replace(config, resume=True), FakeWiping)
     assert (config.out / "bundle" / "policy.onnx").read_bytes() == before
 
 
-def test_stops_in_time_and_keeps_what_it_has(vae, tmp_path, monkeypatch):
-    config = ppo_config(vae, tmp_path / "run", total_steps=10_000_000, max_minutes=1.0, evaluate_episodes=0)
+def test_stops_in_time_and_keeps_what_it_has(encoder, tmp_path, monkeypatch):
+    config = ppo_config(encoder, tmp_path / "run", total_steps=10_000_000, max_minutes=1.0, evaluate_episodes=0)
     minutes = count(start=0.0, step=0.2)  # a clock that a busy machine does not hurry
     monkeypatch.setattr(Recorder, "_session_minutes", lambda self: next(minutes))
     train_policy(config, FakeWiping)
@@ -196,32 +197,33 @@ def test_without_an_encoder_it_says_what_to_do(tmp_path):
     with pytest.raises(InvalidInputError) as error:
         train_policy(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
     assert str(error.value) == (
-        f"{tmp_path} holds no eyes (vae.json, and encoder.onnx where they are learned); "
+        f"{tmp_path} holds no vision encoder (encoder.json, and encoder.onnx where it is learned); "
         f"run `contactsafe train vae --out {tmp_path}` first"
     )
     assert not (tmp_path / "run").exists()
 
 
-def test_eyes_of_another_version_are_refused(vae, tmp_path):
+def test_an_encoder_of_another_version_is_refused(encoder, tmp_path):
     """Their numbers would be read as something else."""
-    text = (vae / "vae.json").read_text(encoding="utf-8")
-    (tmp_path / "vae.json").write_text(text.replace('"format": 3', '"format": 2'), encoding="utf-8")
+    text = (encoder / "encoder.json").read_text(encoding="utf-8")
+    (tmp_path / "encoder.json").write_text(text.replace('"format": 4', '"format": 3'), encoding="utf-8")
     (tmp_path / "encoder.onnx").write_bytes(b"")
     with pytest.raises(InvalidInputError) as error:
         train_policy(ppo_config(tmp_path, tmp_path / "run"), FakeWiping)
     assert str(error.value) == (
-        f"{tmp_path / 'vae.json'} has format 2, this version reads 3; run `contactsafe train vae --out {tmp_path}` anew"
+        f"{tmp_path / 'encoder.json'} has format 3, this version reads 4; "
+        f"run `contactsafe train vae --out {tmp_path}` anew"
     )
 
 
-def test_ppo_learns_to_go_where_the_ink_is(vae, tmp_path):
+def test_ppo_learns_to_go_where_the_ink_is(encoder, tmp_path):
     """With the ink's place readable off the observation, a few thousand steps must pay, over what one rollout does."""
     removed = []
     for steps in (512, 6144):
         config = ppo_config(
-            vae, tmp_path / str(steps), num_envs=16, total_steps=steps, rollout_steps=32, batch=128, epochs=6,
+            encoder, tmp_path / str(steps), num_envs=16, total_steps=steps, rollout_steps=32, batch=128, epochs=6,
             learning_rate=2e-3, net=(64, 64), target_kl=0.05,
-            discount=0.95, evaluate_episodes=16, scan=0.0, observes=("pose",),
+            discount=0.95, evaluate_episodes=16, dither=0.0, observes=("pose",),
         )  # fmt: skip
-        removed.append(train_policy(config, lambda n: SightedWiping(n, max_steps=40))["ink_removed_mean"])
+        removed.append(train_policy(config, lambda n: GuidedWiping(n, max_steps=40))["ink_removed_mean"])
     assert removed[1] > removed[0] + 0.4

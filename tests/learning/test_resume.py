@@ -90,14 +90,14 @@ def no_bundles():
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(vae, tmp_path_factory):
+def uninterrupted(encoder, tmp_path_factory):
     """Give the last checkpoint of a run that was left alone."""
     known = {}
 
     def run(config, make_env):
         if config not in known:
             out = tmp_path_factory.mktemp("whole") / "run"
-            train_policy(dataclasses.replace(config, vae=vae, out=out), make_env)
+            train_policy(dataclasses.replace(config, encoder=encoder, out=out), make_env)
             known[config] = out
         return load_checkpoint(known[config])
 
@@ -120,8 +120,8 @@ def test_what_is_packed_comes_back():
 
 
 @pytest.mark.parametrize("config", [PPO, SAC], ids=["ppo", "sac"])
-def test_one_seed_gives_one_result(config, vae, tmp_path, uninterrupted):
-    again = dataclasses.replace(config, vae=vae, out=tmp_path / "run")
+def test_one_seed_gives_one_result(config, encoder, tmp_path, uninterrupted):
+    again = dataclasses.replace(config, encoder=encoder, out=tmp_path / "run")
     train_policy(again, short_boards)
     assert_same_run(uninterrupted(config, short_boards), load_checkpoint(again.out))
 
@@ -129,22 +129,22 @@ def test_one_seed_gives_one_result(config, vae, tmp_path, uninterrupted):
 @pytest.mark.slow
 @pytest.mark.parametrize("calls", [5, 16, 75])
 @pytest.mark.parametrize("config", [PPO, SAC], ids=["ppo", "sac"])
-def test_killed_and_resumed_equals_uninterrupted(config, calls, vae, tmp_path, uninterrupted):
+def test_killed_and_resumed_equals_uninterrupted(config, calls, encoder, tmp_path, uninterrupted):
     """Killed in the first rollout, between two, or late; 128 steps of each environment in all."""
-    config = dataclasses.replace(config, vae=vae, out=tmp_path / "run")
+    config = dataclasses.replace(config, encoder=encoder, out=tmp_path / "run")
     train_and_die(tmp_path, config, short_boards, calls=calls)
     assert load_checkpoint(config.out)["counters"]["num_timesteps"] == 4 * 16 * (calls // 16)
     train_policy(dataclasses.replace(config, resume=True), short_boards)
-    expected = uninterrupted(dataclasses.replace(config, vae=Path("runs/vae"), out=type(config).out), short_boards)
+    expected = uninterrupted(dataclasses.replace(config, encoder=Path("runs/vae"), out=type(config).out), short_boards)
     assert_same_run(expected, load_checkpoint(config.out))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [PPO, SAC], ids=["ppo", "sac"])
-def test_killed_while_saving_goes_on_from_the_checkpoint_before(config, vae, tmp_path, uninterrupted):
+def test_killed_while_saving_goes_on_from_the_checkpoint_before(config, encoder, tmp_path, uninterrupted):
     """SAC's memory was written already then, and runs over its end."""
     expected = uninterrupted(config, short_boards)
-    config = dataclasses.replace(config, vae=vae, out=tmp_path / "run")
+    config = dataclasses.replace(config, encoder=encoder, out=tmp_path / "run")
     train_and_die(tmp_path, config, short_boards, saves=6)
     assert load_checkpoint(config.out)["counters"]["num_timesteps"] == 5 * 64
     train_policy(dataclasses.replace(config, resume=True), short_boards)
@@ -152,10 +152,10 @@ def test_killed_while_saving_goes_on_from_the_checkpoint_before(config, vae, tmp
 
 
 @pytest.mark.slow
-def test_the_real_task_goes_on_amidst_its_episodes(vae, tmp_path):
+def test_the_real_task_goes_on_amidst_its_episodes(encoder, tmp_path):
     """Killed twice; with another number of threads for the worlds, which do not know of each other."""
     config = PpoConfig(num_envs=3, rollout_steps=12, total_steps=144, batch=18, net=(16, 16), evaluate_episodes=0)
-    whole, parts = (dataclasses.replace(config, vae=vae, out=tmp_path / name) for name in ("whole", "parts"))
+    whole, parts = (dataclasses.replace(config, encoder=encoder, out=tmp_path / name) for name in ("whole", "parts"))
     train_policy(whole, real_boards)
     train_and_die(tmp_path, parts, real_boards, calls=17)
     resumed = dataclasses.replace(parts, resume=True)
@@ -173,8 +173,8 @@ def one_thread(num_envs):
     return env
 
 
-def test_stopped_by_the_clock_and_resumed_equals_uninterrupted(vae, tmp_path, uninterrupted, monkeypatch):
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run")
+def test_stopped_by_the_clock_and_resumed_equals_uninterrupted(encoder, tmp_path, uninterrupted, monkeypatch):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run")
     limited = dataclasses.replace(config, max_minutes=1.0)
     with monkeypatch.context() as patch:
         minutes = count(start=0.0, step=0.2)
@@ -187,9 +187,9 @@ def test_stopped_by_the_clock_and_resumed_equals_uninterrupted(vae, tmp_path, un
 
 
 @pytest.mark.slow
-def test_curves_have_no_point_twice_and_none_missing(vae, tmp_path):
+def test_curves_have_no_point_twice_and_none_missing(encoder, tmp_path):
     """What a killed session logged after its last checkpoint is hidden by the session that goes on."""
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run")
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run")
     train_and_die(tmp_path, config, short_boards, saves=4)
     train_policy(dataclasses.replace(config, resume=True), short_boards)
     curves = EventAccumulator(str(config.out)).Reload()
@@ -208,19 +208,19 @@ def test_a_session_begun_within_the_same_second_is_logged_after_the_other(tmp_pa
     assert [point.step for point in EventAccumulator(str(tmp_path)).Reload().Scalars("a")] == [64, 128]
 
 
-def test_an_environment_that_keeps_nothing_starts_new_episodes(vae, tmp_path):
+def test_an_environment_that_keeps_nothing_starts_new_episodes(encoder, tmp_path):
     class Forgetful(FakeWiping):
-        snapshot = property()
+        state_dict = property()
 
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=128)
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", total_steps=128)
     train_policy(config, Forgetful)
     assert "worlds" not in unpack(load_checkpoint(config.out)["env"])["below"]
     train_policy(dataclasses.replace(config, resume=True, total_steps=256), Forgetful)
     assert load_checkpoint(config.out)["counters"]["num_timesteps"] == 256
 
 
-def test_a_run_that_goes_on_keeps_its_settings_but_for_those_that_are_given(vae, tmp_path, monkeypatch):
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64, max_minutes=5.0, seed=3)
+def test_a_run_that_goes_on_keeps_its_settings_but_for_those_that_are_given(encoder, tmp_path, monkeypatch):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", total_steps=64, max_minutes=5.0, seed=3)
     train_policy(config, FakeWiping)
     told = []
     monkeypatch.setattr("contactsafe.learning.train_policy.train_policy", lambda config, *_: told.append(config))
@@ -231,10 +231,10 @@ def test_a_run_that_goes_on_keeps_its_settings_but_for_those_that_are_given(vae,
     assert told == [resumed, dataclasses.replace(resumed, total_steps=128, max_minutes=1.0)]
 
 
-def test_eyes_that_are_trained_on_keep_their_settings(vae):
-    again = as_started(VaeConfig(out=vae, resume=True))
+def test_an_encoder_that_is_trained_on_keeps_its_settings(encoder):
+    again = as_started(VaeConfig(out=encoder, resume=True))
     assert again.encoder == EncoderConfig(size=32, channels=(4, 4, 8))
-    assert (again.out, again.resume, again.representation, again.images) == (vae, True, "tool", 64)
+    assert (again.out, again.resume, again.representation, again.images) == (encoder, True, "tool", 64)
 
 
 @pytest.mark.parametrize(
@@ -245,8 +245,8 @@ def test_eyes_that_are_trained_on_keep_their_settings(vae):
     ],
     ids=["settings", "task"],
 )
-def test_what_would_end_with_other_weights_is_refused_and_all_of_it_told(changed, seconds, told, vae, tmp_path):
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
+def test_what_would_end_with_other_weights_is_refused_and_all_of_it_told(changed, seconds, told, encoder, tmp_path):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", total_steps=64)
     train_policy(config, real_boards)
     with pytest.raises(InvalidInputError) as error:
         train_policy(dataclasses.replace(config, resume=True, **changed), partial(real_boards, seconds=seconds))
@@ -254,25 +254,25 @@ def test_what_would_end_with_other_weights_is_refused_and_all_of_it_told(changed
     assert str(error.value) == f"the run was started with {told}; {remedy}"
 
 
-def test_what_cannot_be_resumed(vae, tmp_path):
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "run", total_steps=64)
+def test_what_cannot_be_resumed(encoder, tmp_path):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", total_steps=64)
     train_policy(config, FakeWiping)
     with pytest.raises(
         OutputError, match=r"run holds a training run already; give --resume to go on with it, or another"
     ):
         train_policy(config, FakeWiping)
     with pytest.raises(InvalidInputError) as error:
-        train_policy(dataclasses.replace(SAC, vae=vae, out=config.out, resume=True), FakeWiping)
+        train_policy(dataclasses.replace(SAC, encoder=encoder, out=config.out, resume=True), FakeWiping)
     assert str(error.value) == f"{config.out} holds a run of ppo, not of sac; give another --out"
     other = tmp_path / "other"
     other.mkdir()
-    (other / "encoder.onnx").write_bytes((vae / "encoder.onnx").read_bytes())
-    (other / "vae.json").write_bytes((vae / "vae.json").read_bytes() + b" ")
+    (other / "encoder.onnx").write_bytes((encoder / "encoder.onnx").read_bytes())
+    (other / "encoder.json").write_bytes((encoder / "encoder.json").read_bytes() + b" ")
     with pytest.raises(InvalidInputError) as error:
-        train_policy(dataclasses.replace(config, vae=other, resume=True), FakeWiping)
+        train_policy(dataclasses.replace(config, encoder=other, resume=True), FakeWiping)
     assert str(error.value) == (
         f"the encoder in {other} is not the one that the run in {config.out} was started with; "
-        "give that one's folder as --vae, or start anew with another --out"
+        "give that one's folder as --encoder, or start anew with another --out"
     )
     save_checkpoint(config.out, {"policy": {}})
     with pytest.raises(InvalidInputError) as error:
@@ -280,9 +280,9 @@ def test_what_cannot_be_resumed(vae, tmp_path):
     assert str(error.value) == f"{config.out} holds a run of another version; start anew with another --out"
 
 
-def test_a_folder_that_cannot_be_written_is_told_before_anything_is_made(vae, tmp_path):
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_made(encoder, tmp_path):
     (tmp_path / "file").write_text("")
-    config = dataclasses.replace(PPO, vae=vae, out=tmp_path / "file" / "run")
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "file" / "run")
     made = []
     with pytest.raises(OutputError) as error:
         train_policy(config, lambda num_envs: made.append(num_envs))

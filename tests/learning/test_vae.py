@@ -15,7 +15,7 @@ from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint  # noqa: E402
 from contactsafe.learning.datasets import make_dataset  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder, vae_loss  # noqa: E402
-from contactsafe.learning.probe import nearest_ink  # noqa: E402
+from contactsafe.learning.probe import nearest_foreground  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
 from contactsafe.policy.perception import Perception, open_session  # noqa: E402
 
@@ -40,7 +40,7 @@ def test_loss_is_the_formula():
     p = 1.0 / (1.0 + np.exp(-logits))
     likelihood = (6.0 * ink * np.log(p) + (1.0 - ink) * np.log(1.0 - p)).sum() / 2
     divergence = 0.5 * (mean**2 + np.exp(log_var) - 1.0 - log_var).sum() / 2
-    found = vae_loss(*(torch.tensor(x) for x in (logits, ink, mean, log_var)), kl_weight=0.7, ink_weight=6.0)
+    found = vae_loss(*(torch.tensor(x) for x in (logits, ink, mean, log_var)), kl_weight=0.7, foreground_weight=6.0)
     np.testing.assert_allclose([float(x) for x in found], [-likelihood + 0.7 * divergence, -likelihood, divergence])
 
 
@@ -70,7 +70,7 @@ def test_learns_eight_boards_by_heart():
     torch.set_num_threads(1)
     torch.manual_seed(0)
     data = make_dataset(sample_masks, H, 8, 0, "tool", 0.64, 64)
-    ink = torch.from_numpy(data.ink(np.arange(8)))
+    ink = torch.from_numpy(data.images(np.arange(8)))
     vae = VAE(EncoderConfig(size=64))
     optimiser = torch.optim.Adam(vae.parameters(), lr=5e-3)
     for _ in range(250):
@@ -93,13 +93,13 @@ def test_dataset_is_seeded_packed_and_as_the_view_is():
     assert data.packed.nbytes == 20 * 128 * 128 / 8
     masks = data.masks(np.arange(20))
     assert set(np.unique(masks)) == {0, 255}
-    np.testing.assert_array_equal(data.ink(np.arange(20))[:, 0] == 1, masks == 0)
+    np.testing.assert_array_equal(data.images(np.arange(20))[:, 0] == 1, masks == 0)
 
 
 def test_nearest_ink_is_the_vector_from_the_centre():
     ink = np.zeros((2, 1, 8, 8), np.float32)
     ink[0, 0, 4, 6] = ink[0, 0, 0, 0] = 1.0
-    vectors = nearest_ink(ink, 0.8)
+    vectors = nearest_foreground(ink, 0.8)
     np.testing.assert_allclose(vectors[0], [0.25, 0.05])
     assert np.isnan(vectors[1]).all()
 
@@ -136,7 +136,7 @@ def _stop_at(state, epochs, error):
 
 def test_exported_encoder_is_the_trained_one(tmp_path):
     report = train_vae(tiny_config(tmp_path / "run", epochs=1), sample_masks, H)
-    assert json.loads((tmp_path / "run" / "vae.json").read_text())["latent_mean"] == report["latent_mean"]
+    assert json.loads((tmp_path / "run" / "encoder.json").read_text())["latent_mean"] == report["latent_mean"]
     vae = VAE(TINY)
     vae.load_state_dict(load_checkpoint(tmp_path / "run")["model"])
     data = make_dataset(sample_masks, H, 6, 3, "tool", 0.64, 32)
@@ -161,9 +161,10 @@ def test_runs_are_not_mixed_up(tmp_path):
         == f"{config.out} holds a training run already; give --resume to go on with it, or another --out"
     )
     with pytest.raises(InvalidInputError) as error:
-        train_vae(dataclasses.replace(config, resume=True, ink_weight=9.0), sample_masks, H)
+        train_vae(dataclasses.replace(config, resume=True, foreground_weight=9.0), sample_masks, H)
     assert str(error.value) == (
-        "the run was started with ink_weight = 6.0, now it is 9.0; keep the setting, or start anew with another --out"
+        "the run was started with foreground_weight = 6.0, now it is 9.0; keep the setting, or start anew "
+        "with another --out"
     )
     (config.out / "checkpoint.pt").write_bytes(b"no")
     with pytest.raises(InvalidInputError) as error:
@@ -177,7 +178,7 @@ def test_runs_are_not_mixed_up(tmp_path):
 def test_perception_refuses_an_unknown_representation_and_a_wrong_mask():
     with pytest.raises(InvalidInputError) as error:
         Perception(None, "world", 0.64, 128, H)
-    assert str(error.value) == "representation is 'world'; choose one of foveated, tool, paper"
+    assert str(error.value) == "representation is 'world'; choose one of log_polar, tool, paper"
     with pytest.raises(InvalidInputError) as error:
         Perception(None, "paper", 0.64, 128, H)(np.zeros((1, 64, 64), np.uint8), BOARD[None])
     assert str(error.value) == "masks are uint8 of shape (1, 64, 64); this encoder takes uint8 (N, 128, 128)"

@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
-from contactsafe.policy.action import ACTION_NAMES, DOWN, rotation_from_down
-from contactsafe.policy.action_config import ActionConfig
-from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.policy.action import DOWN, rotation_from_down
+from contactsafe.policy.action_config import ACTION_SIZE, ACTIONS, ActionConfig
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -48,7 +47,7 @@ def test_steps_last_17_17_16_ticks(tasks):
     assert tasks.worlds.plants[0]["tick"] == 150  # 9 steps of 1/60 s
 
 
-@pytest.mark.parametrize("index", range(18), ids=ACTION_NAMES)
+@pytest.mark.parametrize("index", range(18), ids=ACTIONS)
 @pytest.mark.parametrize("value", [0.5, -1.0])
 def test_each_number_moves_its_own_part_of_the_target(tasks, index, value):
     before = target_of(tasks)
@@ -79,8 +78,8 @@ def test_x_d_leads_the_tool_by_a_hand_at_most(tasks, sign):
         before = tasks.worlds.controllers[0]["output"]["position"].copy()
         act(tasks, slice(0, 2), sign)
         lead = target_of(tasks)[:2] - before[:2]
-        assert np.abs(lead).max() <= CONFIG.lead + 1e-12
-    assert_allclose(np.abs(lead).max(), CONFIG.lead, atol=0.02)
+        assert np.abs(lead).max() <= CONFIG.offset_max + 1e-12
+    assert_allclose(np.abs(lead).max(), CONFIG.offset_max, atol=0.02)
 
 
 def test_x_d_keeps_to_its_box(tasks):

@@ -17,24 +17,33 @@ from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
-from contactsafe.policy.bundle import Bundle, digest  # noqa: E402
+from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402
-from contactsafe.policy.observation import ObservationScaling  # noqa: E402
+from contactsafe.policy.manifest import digest  # noqa: E402
+from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
 from contactsafe.policy.operators import RULES  # noqa: E402
 from contactsafe.policy.policy import Policy  # noqa: E402
-from contactsafe.tasks.wiping.tasks import OBSERVED  # noqa: E402
 from contactsafe.vision.log_polar import FEATURES  # noqa: E402
 
 H = camera_homography()
+OBSERVED = {"pose": 6, "target": 18, "force": 3}
+POSE = Observation("pose", (0.5, 0.0, 0.01, 0.0, 0.0, 0.0), (0.15, 0.15, 0.03, 0.1, 0.1, 0.1))
+
+
+def listed(names):
+    return [{"name": name, "size": OBSERVED[name]} for name in names]
+
+
 DESCRIPTION = {
+    "task": "wiping",
     "representation": "tool",
     "window_m": 0.64,
     "view_size": 32,
     "latent_size": 128,
-    "observes": ["pose"],
+    "observes": listed(["pose"]),
     "rate_hz": 60.0,
     "action_repeat": 1,
-    "scan": {"amplitude": 0.0},
+    "dither": {"amplitude": 0.0},
     "training": {},
     "results": {},
 }
@@ -44,7 +53,7 @@ def networks():
     torch.manual_seed(0)
     layers = torch.nn.Sequential(torch.nn.Linear(134, 16), torch.nn.Tanh(), torch.nn.Linear(16, 18))
     torch.nn.init.normal_(layers[-1].weight, std=2.0)
-    scaling = ObservationScaling.from_statistics(["pose"], np.zeros(128), np.ones(128))
+    scaling = ObservationScaling.from_statistics([POSE], np.zeros(128), np.ones(128))
     return VAE(EncoderConfig(size=32, channels=(4, 4, 8))), layers, scaling
 
 
@@ -135,17 +144,17 @@ def test_bad_observations_are_refused(exported):
         Policy(exported, np.zeros((3, 3)))
 
 
-def foveated_bundle(folder, observes):
+def log_polar_bundle(folder, observes):
     torch.manual_seed(0)
     k = sum(OBSERVED[name] for name in observes)
     layers = torch.nn.Sequential(torch.nn.Linear(k + FEATURES, 18))
     scaling = ObservationScaling(observes, (0.0,) * (k + FEATURES), (1.0,) * (k + FEATURES))
-    eyes = {"representation": "foveated", "view_size": 128, "latent_size": FEATURES, "observes": observes}
-    return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **eyes})
+    encoder = {"representation": "log_polar", "view_size": 128, "latent_size": FEATURES}
+    return export_bundle(folder, None, layers, scaling, {**DESCRIPTION, **encoder, "observes": listed(observes)})
 
 
-def test_foveated_needs_no_encoder_and_the_scale_of_a_homography_says_nothing(tmp_path):
-    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
+def test_log_polar_needs_no_encoder_and_the_scale_of_a_homography_says_nothing(tmp_path):
+    folder = log_polar_bundle(tmp_path / "bundle", ["pose"])
     assert sorted(path.name for path in folder.iterdir()) == ["bundle.json", "policy.onnx"]
     np.testing.assert_allclose(
         Policy(folder, H).act(observations()), Policy(folder, 3.0 * H).act(observations()), atol=1e-6
@@ -153,7 +162,7 @@ def test_foveated_needs_no_encoder_and_the_scale_of_a_homography_says_nothing(tm
 
 
 def test_what_is_observed_besides_the_picture_is_asked_for(tmp_path):
-    policy = Policy(foveated_bundle(tmp_path / "bundle", ["pose", "target", "force"]), H)
+    policy = Policy(log_polar_bundle(tmp_path / "bundle", ["pose", "target", "force"]), H)
     seen = {**observations(), "target": np.zeros((5, 18)), "force": np.zeros((5, 3))}
     moved = {**seen, "force": np.ones((5, 3))}
     assert np.abs(policy.act(seen) - policy.act(moved)).max() > 0.0
@@ -164,9 +173,9 @@ def test_what_is_observed_besides_the_picture_is_asked_for(tmp_path):
 
 
 def test_the_motion_laid_over_the_actions_is_the_episodes_own(tmp_path):
-    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
-    rewrite(folder, scan={"amplitude": 0.25, "period_s": 1.0})
-    still, policy, seen = Policy(foveated_bundle(tmp_path / "still", ["pose"]), H), Policy(folder, H), observations(2)
+    folder = log_polar_bundle(tmp_path / "bundle", ["pose"])
+    rewrite(folder, dither={"amplitude": 0.25, "period_s": 1.0})
+    still, policy, seen = Policy(log_polar_bundle(tmp_path / "still", ["pose"]), H), Policy(folder, H), observations(2)
     free = np.abs(still.act(seen)[:, :2]) < 0.75
     offsets = []
     for _ in range(60):
@@ -176,8 +185,8 @@ def test_the_motion_laid_over_the_actions_is_the_episodes_own(tmp_path):
     assert 0.2 < np.abs(np.array(offsets)[:, :, :2][:, free]).max() <= 0.2501
     again = policy.act(seen) - still.act(seen)
     np.testing.assert_array_equal(again[1], offsets[0][1])
-    rewrite(folder, scan={"amplitude": 2.0})
-    assert refusal(folder) == f"{folder}/bundle.json: scan is {{'amplitude': 2.0}}; export the bundle anew"
+    rewrite(folder, dither={"amplitude": 2.0})
+    assert refusal(folder) == f"{folder}/bundle.json: dither is {{'amplitude': 2.0}}; export the bundle anew"
 
 
 def test_missing(bundle):
@@ -217,8 +226,8 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
     path.write_text(whole)
     rewrite(bundle, format=99)
-    assert refusal(bundle) == f"{path} has format 99, this version reads 3; export it anew, or upgrade"
-    rewrite(bundle, format=3, rate_hz="60")
+    assert refusal(bundle) == f"{path} has format 99, this version reads 4; export it anew, or upgrade"
+    rewrite(bundle, format=4, rate_hz="60")
     assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
     rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
     assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"
@@ -497,7 +506,7 @@ WILD = ("9" * 900_000, [0] * 100_000, {"x" * 100_000: 1}, 10**4000, [[["x"] * 9]
 @pytest.mark.parametrize("value", WILD, ids=["text", "list", "object", "number", "nested"])
 def test_a_field_of_900_000_digits_is_shown_short(bundle, value):
     whole = json.loads((bundle / "bundle.json").read_text())
-    for field in ("format", "representation", "observes", "view_size", "window_m", "scan"):
+    for field in ("format", "representation", "observes", "view_size", "window_m", "dither"):
         rewrite(bundle, **{**whole, field: value})
         assert len(refusal(bundle).replace(str(bundle), "")) < 250
 
@@ -510,14 +519,14 @@ def test_a_number_of_900_000_digits_is_no_json(bundle):
 
 def test_a_name_that_stands_twice_in_the_manifest_is_refused(bundle):
     text = (bundle / "bundle.json").read_text()
-    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 3,', 1))
+    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 4,', 1))
     assert refusal(bundle) == (
         f"{bundle}/bundle.json says 'format' twice; the bundle is damaged, copy or export it anew"
     )
 
 
-def test_numbers_of_a_foveated_picture_that_cannot_be_are_refused(tmp_path):
-    folder = foveated_bundle(tmp_path / "bundle", ["pose"])
+def test_numbers_of_log_polar_features_that_cannot_be_are_refused(tmp_path):
+    folder = log_polar_bundle(tmp_path / "bundle", ["pose"])
     rewrite(folder, latent_size=5)
     assert refusal(folder).endswith(f"latent_size = 5 is outside [{FEATURES}, {FEATURES}]; export the bundle anew")
 

@@ -1,4 +1,4 @@
-"""What a foveated picture says: where ink is from here, however little of it, whatever camera looks."""
+"""Log-polar features: where ink is from here, however little of it, whatever camera looks."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -12,7 +12,7 @@ from tests.learning.fakes import BOARD, camera_homography
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.camera import plane_homography
 from contactsafe.sim.config import Camera
-from contactsafe.vision.log_polar import FEATURES, RINGS, SCALES_M, SECTORS, foveate, ground_of
+from contactsafe.vision.log_polar import FEATURES, RINGS, SCALES_M, SECTORS, ground_of, log_polar_features
 
 H = camera_homography()
 GROUND = ground_of(H, (128, 128))
@@ -29,7 +29,7 @@ def mask_of(*points):
 
 
 def look(mask, tool=(0.0, 0.0)):
-    return foveate(mask, (BOARD + tool)[None], GROUND)[0]
+    return log_polar_features(mask, (BOARD + tool)[None], GROUND)[0]
 
 
 def patch(picture, k):
@@ -91,7 +91,7 @@ def test_another_camera_sees_ink_in_the_same_place(speck, tool):
     u, v, w = aside @ [*(BOARD + speck), 1.0]
     mask = np.full((1, 128, 128), 255, np.uint8)
     mask[0, int(v / w), int(u / w)] = 0
-    other = foveate(mask, (BOARD + tool)[None], ground_of(aside, (128, 128)))[0]
+    other = log_polar_features(mask, (BOARD + tool)[None], ground_of(aside, (128, 128)))[0]
     assert np.linalg.norm(patch(other, 0) - patch(look(mask_of(speck), tool), 0)) < 0.01
 
 
@@ -110,17 +110,17 @@ def test_threads_see_the_same(n):
     masks = np.where(rng.random((n, 128, 128)) < 0.01, 0, 255).astype(np.uint8)
     tools = BOARD + rng.uniform(-0.1, 0.1, (n, 2))
     with ThreadPoolExecutor(2) as threads:
-        assert_array_equal(foveate(masks, tools, GROUND, threads), foveate(masks, tools, GROUND))
+        assert_array_equal(log_polar_features(masks, tools, GROUND, threads), log_polar_features(masks, tools, GROUND))
         with pytest.raises(InvalidInputError, match=f"one row of x, y for each of {n} masks"):
-            foveate(masks, np.zeros((n + 1, 2)), GROUND, threads)
+            log_polar_features(masks, np.zeros((n + 1, 2)), GROUND, threads)
 
 
 def test_what_cannot_be_looked_at_is_refused():
     with pytest.raises(InvalidInputError) as error:
-        foveate(np.zeros((1, 64, 64), np.uint8), BOARD[None], GROUND)
+        log_polar_features(np.zeros((1, 64, 64), np.uint8), BOARD[None], GROUND)
     assert str(error.value) == "masks are uint8 of shape (1, 64, 64); give uint8 of 16384 pixels each"
     with pytest.raises(InvalidInputError) as error:
-        foveate(mask_of(), np.zeros((2, 2)), GROUND)
+        log_polar_features(mask_of(), np.zeros((2, 2)), GROUND)
     assert str(error.value) == "tool_positions have shape (2, 2); give one row of x, y for each of 1 masks"
     with pytest.raises(InvalidInputError) as error:
         ground_of(np.ones((3, 3)), (128, 128))

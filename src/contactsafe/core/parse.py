@@ -78,13 +78,14 @@ def _known(name: str, known: Sequence[str]) -> str:
     return name
 
 
-def parse(what: Callable, program: str, words: Sequence[str], **options: Any) -> Any:
+def parse(what: Callable, program: str, words: Sequence[str], description: str | None = None, **options: Any) -> Any:
     """Turn words into what a dataclass or a function's arguments ask for.
 
     Args:
         what: dataclass to make, or function to call with what was said.
         program: how the command is called, for help and messages.
         words: after it.
+        description: what help says first; None for the docstring.
         options: of `tyro.cli`.
 
     Raises:
@@ -99,7 +100,7 @@ def parse(what: Callable, program: str, words: Sequence[str], **options: Any) ->
                 what,
                 prog=program,
                 args=list(words),
-                description=_description(docstring(what)),
+                description=_description(docstring(what) if description is None else description),
                 config=(tyro.conf.DisallowNone,),
                 **options,
             )
@@ -123,7 +124,7 @@ def call(function: Callable, program: str, words: Sequence[str]) -> None:
 
 
 def docstring(thing: Any) -> str:
-    """Give the docstring of a function or class; from its source where `python -OO` has dropped it."""
+    """Return the docstring of a function or class; from its source where `python -OO` has dropped it."""
     if sys.flags.optimize < 2:
         return inspect.getdoc(thing) or ""
     try:
@@ -151,7 +152,7 @@ def _description(text: str) -> str:
 
 
 def _parts(what: Any) -> Iterator[Any]:
-    """Give the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
+    """Yield the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
     for kind in getattr(what, "__mro__", ()):
         if dataclasses.is_dataclass(kind):
             yield kind

@@ -9,7 +9,7 @@ import numpy as np
 from contactsafe.control.tick import control_tick, tick_at
 from contactsafe.core.compiled import compiled
 from contactsafe.core.native import mj_step
-from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.policy import Policy
 from contactsafe.sim.stepping import run_ticks
 from contactsafe.sim.truth import noise_channels

@@ -1,5 +1,5 @@
-"""From masks to a policy: β-VAE, PPO or SAC, and the bundle in which a policy is shipped and run.
+"""From a task to a policy: vision encoder, PPO or SAC, checkpoints, and the export of a bundle.
 
-`bundle`, `policy`, `perception` and `evaluation` need NumPy and ONNX Runtime alone. What trains (`encoder`, `datasets`,
-`train_vae`, `algorithms`, `train_policy` …) needs `contactsafe[train]`; nothing here imports it for you.
+Needs `contactsafe[train]`; nothing here imports it for you. What runs a policy is in `contactsafe.policy`, and needs
+NumPy and ONNX Runtime alone.
 """

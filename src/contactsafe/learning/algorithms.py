@@ -6,10 +6,12 @@ from typing import ClassVar
 
 import torch
 from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.policy_config import PolicyConfig
+from contactsafe.learning.vec_env import EncodedVecEnv
 
 
 @dataclass(frozen=True)
@@ -25,8 +27,8 @@ class PpoConfig(PolicyConfig):
         max_grad_norm: gradients are clipped to this.
         target_kl: an update stops early when the policy moved further than this.
         log_std_init: log of the first standard deviation of each action.
-        log_std_final: of the last; between them it falls linearly, for the mean alone, which is what is shipped, stands
-            still before ink that exploration gets at by chance.
+        log_std_final: of the last; between them it falls linearly: the mean alone, which is what is shipped, stands
+            still before what exploration only gets at by accident.
     """
 
     algorithm: ClassVar[str] = "ppo"
@@ -44,7 +46,7 @@ class PpoConfig(PolicyConfig):
     log_std_init: float = -1.0
     log_std_final: float = -1.7
 
-    def make_model(self, env):
+    def make_model(self, env: EncodedVecEnv) -> PPO:
         """Make an untrained PPO."""
         return PPO(
             "MlpPolicy",
@@ -69,14 +71,14 @@ class PpoConfig(PolicyConfig):
             device="cpu",
         )
 
-    def prepare_rollout(self, model):
+    def prepare_rollout(self, model: BaseAlgorithm) -> None:
         """Let exploration fall with the steps done."""
         done = min(model.num_timesteps / self.total_steps, 1.0)
         with torch.no_grad():
             model.policy.log_std.fill_(self.log_std_init + done * (self.log_std_final - self.log_std_init))
 
-    def actor(self, model):
-        """Give the mean of the action distribution."""
+    def actor(self, model: BaseAlgorithm) -> nn.Module:
+        """Return the mean of the action distribution."""
         return nn.Sequential(model.policy.mlp_extractor.policy_net, model.policy.action_net)
 
 
@@ -86,10 +88,10 @@ class SacConfig(PolicyConfig):
 
     Attributes:
         buffer: transitions remembered, over all environments; 1.2 kB each in memory, and as much on disk.
-        learning_starts: steps with actions drawn at random before the first update.
+        learning_starts: steps with random actions before the first update.
         update_every: steps of each environment between updates.
         gradient_steps: gradient steps of an update.
-        target_fraction: of the way that the target networks go towards the critics in a gradient step.
+        target_fraction: of the difference by which the target networks move towards the critics in a gradient step.
         entropy_start: first weight of the entropy; it is then tuned to an entropy of minus the number of actions. It
             falls slowly: what is far above a step's reward, of some hundredths, is all that counts for long.
     """
@@ -110,7 +112,7 @@ class SacConfig(PolicyConfig):
     target_fraction: float = 0.005
     entropy_start: float = 0.005
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a memory that is gone before it is saved."""
         super().__post_init__()
         least = 2 * self.num_envs * max(self.rollout_steps, self.update_every)
@@ -120,7 +122,7 @@ class SacConfig(PolicyConfig):
             if getattr(self, name) < 1:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 1 or more")
 
-    def make_model(self, env):
+    def make_model(self, env: EncodedVecEnv) -> SAC:
         """Make an untrained SAC."""
         return SAC(
             "MlpPolicy",
@@ -139,8 +141,8 @@ class SacConfig(PolicyConfig):
             device="cpu",
         )
 
-    def actor(self, model):
-        """Give the squashed mean of the action distribution."""
+    def actor(self, model: BaseAlgorithm) -> nn.Module:
+        """Return the squashed mean of the action distribution."""
         return nn.Sequential(model.actor.latent_pi, model.actor.mu, nn.Tanh())
 
 

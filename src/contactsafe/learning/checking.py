@@ -1,6 +1,7 @@
 """Whether what was read from a checkpoint can have been written by a run: kinds, keys, shapes, bounds."""
 
 import math
+from typing import Any
 
 import torch
 
@@ -11,8 +12,8 @@ class CheckpointError(InvalidInputError):
     """A checkpoint holds what no run can have written; the text says where and what."""
 
 
-def part(state, name, kind):
-    """Give a part of a checkpoint's state, a dict, that must be there and of a kind."""
+def entry(state: Any, name: str, kind: type | tuple[type, ...]) -> Any:
+    """Return an entry of a checkpoint's state, a dict, that must be there and of a kind."""
     if not isinstance(state, dict) or name not in state:
         raise CheckpointError(f"{name} is missing")
     value = state[name]
@@ -21,15 +22,15 @@ def part(state, name, kind):
     return value
 
 
-def whole(state, name, most=2**53):
-    """Give a part of a state that is a whole number from 0 to most."""
-    value = part(state, name, int)
+def whole(state: Any, name: str, most: int = 2**53) -> int:
+    """Return an entry of a state that is a whole number from 0 to most."""
+    value = entry(state, name, int)
     if not 0 <= value <= most:
         raise CheckpointError(f"{name} = {shown(value)} is outside [0, {most}]")
     return value
 
 
-def check_like(found, wanted, path):
+def check_like(found: Any, wanted: Any, path: str) -> None:
     """Refuse nested values that are not of the kinds, keys, lengths, types and shapes of others, or not finite.
 
     Args:
@@ -60,7 +61,7 @@ def check_like(found, wanted, path):
         raise CheckpointError(f"{path} is {shown(found)}, not {shown(wanted)}")
 
 
-def check_tensor(found, wanted, path):
+def check_tensor(found: Any, wanted: torch.Tensor, path: str) -> None:
     """Refuse a tensor of another type or shape than wanted, or that is not finite."""
     if not isinstance(found, torch.Tensor) or found.layout != torch.strided or found.dtype != wanted.dtype:
         raise CheckpointError(f"{path} is {kind_of(found)}, not {wanted.dtype}")
@@ -70,12 +71,12 @@ def check_tensor(found, wanted, path):
         raise CheckpointError(f"{path} is not finite")
 
 
-def kind_of(found):
+def kind_of(found: Any) -> Any:
     """Say what kind of value was found."""
     return found.dtype if isinstance(found, torch.Tensor) else shown(found)
 
 
-def check_optimiser(found, optimiser, path):
+def check_optimiser(found: Any, optimiser: torch.optim.Optimizer, path: str) -> None:
     """Refuse the state of an optimiser that does not fit its parameters.
 
     Args:
@@ -87,11 +88,11 @@ def check_optimiser(found, optimiser, path):
         CheckpointError: it is of other parameters, or not finite.
     """
     now = optimiser.state_dict()
-    check_like(part(found, "param_groups", list), now["param_groups"], f"{path}.param_groups")
+    check_like(entry(found, "param_groups", list), now["param_groups"], f"{path}.param_groups")
     if [group["params"] for group in found["param_groups"]] != [group["params"] for group in now["param_groups"]]:
         raise CheckpointError(f"{path}.param_groups is of other parameters")
     parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
-    for index, memory in part(found, "state", dict).items():
+    for index, memory in entry(found, "state", dict).items():
         where = f"{path}.state[{shown(index)}]"
         if type(index) is not int or not 0 <= index < len(parameters) or not isinstance(memory, dict):
             raise CheckpointError(f"{where} is {shown(memory)}, of no parameter")

@@ -1,5 +1,6 @@
-"""Pictures to train the β-VAE on: boards from full to nearly clean, a bit a pixel."""
+"""Images to train the β-VAE on, from full to nearly empty masks, a bit a pixel."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,40 +15,52 @@ CHUNK = 512
 
 @dataclass(frozen=True)
 class MaskDataset:
-    """Binary pictures, packed.
+    """Binary images, packed.
 
     Attributes:
-        packed: (n, size, size / 8) uint8, a bit a pixel, 1 is ink.
+        packed: (n, size, size / 8) uint8, a bit a pixel, 1 is foreground.
     """
 
     packed: np.ndarray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.packed)
 
-    def ink(self, indices):
-        """Unpack the pictures asked for, (len(indices), 1, size, size) float32, 1 is ink."""
+    def images(self, indices: np.ndarray) -> np.ndarray:
+        """Unpack the images asked for, (len(indices), 1, size, size) float32, 1 is foreground."""
         return np.unpackbits(self.packed[indices], axis=2)[:, None].astype(np.float32)
 
-    def masks(self, indices):
-        """Unpack the pictures asked for as the encoder takes them, (len(indices), size, size) uint8, 0 is ink."""
+    def masks(self, indices: np.ndarray) -> np.ndarray:
+        """Unpack the images asked for as the encoder takes them, (len(indices), size, size) uint8, 0 is foreground."""
         return (1 - np.unpackbits(self.packed[indices], axis=2)) * np.uint8(255)
 
 
-def make_dataset(sample_masks, homography, count, seed, representation, window_m, size):
-    """Draw boards and show each as the encoder will see it.
+SampleMasks = Callable[[int, int], tuple[np.ndarray, np.ndarray]]
+"""`sample_masks(n, seed)` returns camera masks (n, 128, 128) uint8 and tool positions (n, 3) in m."""
+
+
+def make_dataset(
+    sample_masks: SampleMasks,
+    homography: np.ndarray,
+    count: int,
+    seed: int,
+    representation: str,
+    window_m: float,
+    size: int,
+) -> MaskDataset:
+    """Sample masks and show each as the encoder will see it.
 
     Args:
-        sample_masks: `sample_masks(n, seed)` gives camera masks (n, 128, 128) uint8 and tool positions (n, 3) in m.
-        homography: board plane to pixels, (3, 3).
-        count: pictures to make.
-        seed: of the draw; the same seed gives the same pictures.
+        sample_masks: where the masks come from.
+        homography: working plane to pixels, (3, 3).
+        count: images to make.
+        seed: of the masks; the same seed gives the same images.
         representation: "tool" (rectified to the tool's frame) or "paper" (as the camera sees it).
         window_m: side of the tool's window, m.
         size: pixels along a side.
 
     Returns:
-        A MaskDataset of count pictures.
+        A MaskDataset of count images.
 
     Raises:
         InvalidInputError: representation is unknown, or "paper" masks are not of the given size.
@@ -57,7 +70,7 @@ def make_dataset(sample_masks, homography, count, seed, representation, window_m
     packed = np.empty((count, size, size // 8), dtype=np.uint8)
     starts = range(0, count, CHUNK)
     seeds = np.random.SeedSequence(seed).generate_state(len(starts))
-    for start, chunk_seed in zip(tqdm(starts, desc="drawing boards", unit="chunk"), seeds, strict=True):
+    for start, chunk_seed in zip(tqdm(starts, desc="sampling masks", unit="chunk"), seeds, strict=True):
         n = min(CHUNK, count - start)
         masks, tools = sample_masks(n, int(chunk_seed))
         if representation == "tool":

@@ -1,7 +1,7 @@
 """The β-VAE: a mask to a Gaussian latent of 128 numbers, or another multiple of 64, and back (paper, section III-F).
 
 Fully convolutional, so a latent number belongs to a place in the picture: two numbers for each cell of an 8 x 8 grid.
-The policy reads "where is ink" off that with a small network; off a dense code it would have to learn geometry first.
+The policy reads "where is it" off that with a small network; off a dense code it would have to learn geometry first.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class EncoderConfig:
     channels: tuple[int, int, int] = (12, 16, 32)
     maps: int = 2
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a size that the three strides do not bring down to the grid."""
         if self.size < 32 or self.size % 32:
             raise InvalidInputError(f"encoder.size = {self.size}; give a multiple of 32")
@@ -44,7 +44,7 @@ class EncoderConfig:
 
 
 class VAE(nn.Module):
-    """Encoder and decoder over pictures of ink: 1 is ink, 0 is none, (N, 1, size, size) float32."""
+    """Encoder and decoder over binary images: 1 is foreground, 0 is none, (N, 1, size, size) float32."""
 
     def __init__(self, config: EncoderConfig):
         super().__init__()
@@ -73,57 +73,64 @@ class VAE(nn.Module):
             nn.Conv2d(first, patch * patch, 1),
             nn.PixelShuffle(patch),
         )
-        # Ink is rare: start from a blank page, not from a grey one.
+        # Foreground is rare: start from a blank page, not from a grey one.
         nn.init.constant_(self.decoder[-2].bias, -3.0)
         self.to(memory_format=torch.channels_last)
 
-    def encode(self, ink):
-        """Give mean and log-variance of the latent, each (N, latent)."""
-        mean, log_var = self.encoder(ink).chunk(2, dim=1)
+    def encode(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return mean and log-variance of the latent, each (N, latent)."""
+        mean, log_var = self.encoder(image).chunk(2, dim=1)
         return mean.flatten(1), log_var.flatten(1).clamp(-10.0, 4.0)
 
-    def decode(self, latent):
-        """Give the logit of ink at each pixel, (N, 1, size, size)."""
+    def decode(self, latent: torch.Tensor) -> torch.Tensor:
+        """Return the logit of foreground at each pixel, (N, 1, size, size)."""
         return self.decoder(latent.reshape(-1, self.config.maps, GRID, GRID))
 
-    def forward(self, ink, noise):
+    def forward(self, image: torch.Tensor, noise: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Encode, sample with the given standard normal noise (N, latent), decode: (logits, mean, log_var)."""
-        mean, log_var = self.encode(ink)
+        mean, log_var = self.encode(image)
         return self.decode(mean + noise * torch.exp(0.5 * log_var)), mean, log_var
 
 
-def vae_loss(logits, ink, mean, log_var, kl_weight, ink_weight):
-    """The paper's (24) with its sign turned, so that less is better, and with ink pixels weighted.
+def vae_loss(
+    logits: torch.Tensor,
+    image: torch.Tensor,
+    mean: torch.Tensor,
+    log_var: torch.Tensor,
+    kl_weight: float,
+    foreground_weight: float,
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Compute the paper's (24) with its sign turned, so that less is better, and with foreground pixels weighted.
 
-    Thin ink is under one per cent of the pixels: unweighted, the best small code is a blank page.
+    Thin strokes are under one per cent of the pixels: unweighted, the best small code is a blank image.
 
     Args:
-        logits: log-odds of ink, (N, 1, size, size).
-        ink: the picture, 1 is ink, same shape.
+        logits: log-odds of foreground, (N, 1, size, size).
+        image: 1 is foreground, same shape.
         mean: of the latent, (N, latent).
         log_var: of the latent, (N, latent).
         kl_weight: the paper's β.
-        ink_weight: how many blank pixels one ink pixel counts for.
+        foreground_weight: how many background pixels one foreground pixel counts for.
 
     Returns:
         Loss, reconstruction and divergence, each a scalar: sums over a picture, mean over the batch, nat.
     """
-    weight = torch.as_tensor(ink_weight, dtype=logits.dtype)
-    reconstruction = functional.binary_cross_entropy_with_logits(logits, ink, pos_weight=weight, reduction="sum") / len(
-        ink
-    )
-    divergence = 0.5 * (mean**2 + log_var.exp() - 1.0 - log_var).sum() / len(ink)
+    weight = torch.as_tensor(foreground_weight, dtype=logits.dtype)
+    reconstruction = functional.binary_cross_entropy_with_logits(
+        logits, image, pos_weight=weight, reduction="sum"
+    ) / len(image)
+    divergence = 0.5 * (mean**2 + log_var.exp() - 1.0 - log_var).sum() / len(image)
     return reconstruction + kl_weight * divergence, reconstruction, divergence
 
 
 class MaskEncoder(nn.Module):
-    """What is exported: masks (N, size, size) uint8, ink 0, to the latent's mean (N, latent) float32."""
+    """What is exported: masks (N, size, size) uint8, foreground 0, to the latent's mean (N, latent) float32."""
 
     def __init__(self, vae: VAE):
         super().__init__()
         self.vae = vae
 
-    def forward(self, mask):
+    def forward(self, mask: torch.Tensor) -> torch.Tensor:
         """Scale inside the graph, so that whoever runs it can hand over the mask as it is."""
-        ink = 1.0 - mask.unsqueeze(1).to(torch.float32) / 255.0
-        return self.vae.encode(ink)[0]
+        image = 1.0 - mask.unsqueeze(1).to(torch.float32) / 255.0
+        return self.vae.encode(image)[0]

@@ -6,8 +6,10 @@ import os
 import shutil
 import tempfile
 import warnings
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -17,13 +19,15 @@ from torch import nn
 from contactsafe.core.errors import BundleError, ContactSafeError, OutputError
 from contactsafe.core.files import cannot_write, write_whole
 from contactsafe.learning.checkpoints import write_json
-from contactsafe.learning.encoder import MaskEncoder
-from contactsafe.policy.bundle import ACTIONS, ENCODER, FORMAT, MANIFEST, POLICY, Bundle, digest
-from contactsafe.policy.observation import OBSERVED
+from contactsafe.learning.encoder import VAE, MaskEncoder
+from contactsafe.policy.action_config import ACTIONS
+from contactsafe.policy.bundle import ENCODER, POLICY, Bundle
+from contactsafe.policy.manifest import FORMAT, MANIFEST, digest
+from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import open_session
 
 TOLERANCE = 1e-4
-"""Largest difference between torch and ONNX Runtime that is let pass.
+"""Largest difference between torch and ONNX Runtime that is accepted.
 
 Single precision rounds to 2e-5 of an action in nets that training has made steep, by another rule on each processor;
 a model that was exported wrongly is off by 1e-2 and more.
@@ -37,24 +41,28 @@ class DeployedPolicy(nn.Module):
 
     Args:
         layers: the trained network, scaled observation (N, k) to mean action (N, 18).
-        scaling: the ObservationScaling it was trained with.
+        scaling: that it was trained with.
     """
 
-    def __init__(self, layers, scaling):
+    centre: torch.Tensor
+    scale: torch.Tensor
+
+    def __init__(self, layers: nn.Module, scaling: ObservationScaling):
         super().__init__()
         self.layers = layers
         self.clip = scaling.clip
         self.register_buffer("centre", torch.tensor(scaling.centre, dtype=torch.float32))
         self.register_buffer("scale", torch.tensor(scaling.scale, dtype=torch.float32))
 
-    def forward(self, state, latent):
-        """Give the action, (N, 18) in [-1, 1]."""
-        scaled = (torch.cat([state, latent], dim=1) - self.centre) / self.scale
+    def forward(self, state: torch.Tensor, latent: torch.Tensor | None = None) -> torch.Tensor:
+        """Compute the action, (N, 18) in [-1, 1]."""
+        observed = state if latent is None else torch.cat([state, latent], dim=1)
+        scaled = (observed - self.centre) / self.scale
         return self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
 
 
 @contextlib.contextmanager
-def _quiet(name):
+def _quiet(name: str) -> Iterator[None]:
     """Keep a logger's warnings back: the exporter tells of packages that nothing here asks for."""
     logger = logging.getLogger(name)
     level = logger.level
@@ -65,7 +73,7 @@ def _quiet(name):
         logger.setLevel(level)
 
 
-def to_onnx(module, examples, inputs, output):
+def to_onnx(module: nn.Module, examples: Sequence[torch.Tensor], inputs: Sequence[str], output: str) -> bytes:
     """Export a module with a free batch size, all weights inside, and no trace of the machine it was made on.
 
     Args:
@@ -104,7 +112,7 @@ def to_onnx(module, examples, inputs, output):
     return model.SerializeToString()
 
 
-def compare(module, data, name, examples, inputs):
+def compare(module: nn.Module, data: bytes, name: str, examples: Sequence[torch.Tensor], inputs: Sequence[str]) -> None:
     """Refuse an exported model that does not compute what the trained one does.
 
     Raises:
@@ -121,13 +129,13 @@ def compare(module, data, name, examples, inputs):
         )
 
 
-def export_encoder(vae, path, size):
+def export_encoder(vae: VAE, path: Path | str, size: int) -> None:
     """Write the encoder of a trained VAE as ONNX, atomically, after comparing it with torch.
 
     Args:
         vae: the trained network.
         path: where to.
-        size: pixels along a side of its picture.
+        size: pixels along a side of its image.
 
     Raises:
         ContactSafeError: the exported model computes something else.
@@ -141,16 +149,23 @@ def export_encoder(vae, path, size):
     write_whole(Path(path), data)
 
 
-def export_bundle(folder, encoder, layers, scaling, description, force=False):
+def export_bundle(
+    folder: Path | str,
+    encoder: bytes | None,
+    layers: nn.Module,
+    scaling: ObservationScaling,
+    description: dict[str, Any],
+    force: bool = False,
+) -> Path:
     """Write a bundle: its models, bundle.json with their digests, the whole read back before it takes its place.
 
     Args:
         folder: where to; made anew.
         encoder: bytes of encoder.onnx; None for a representation that has none.
         layers: the trained policy network, scaled observation (N, k) to mean action (N, 18).
-        scaling: the ObservationScaling it was trained with.
-        description: representation, window_m, view_size, latent_size, observes, rate_hz, action_repeat, training,
-            results.
+        scaling: that it was trained with.
+        description: task, representation, latent_size, window_m and view_size where it sees images, observes, rate_hz,
+            action_repeat, dither, training, results.
         force: replace a folder that is there.
 
     Returns:
@@ -165,22 +180,34 @@ def export_bundle(folder, encoder, layers, scaling, description, force=False):
         raise OutputError(f"{folder} exists; give --force to replace it, or another folder")
     if folder.exists() and any(folder.iterdir()) and not (folder / MANIFEST).is_file():
         raise OutputError(f"{folder} is no bundle and will not be replaced; give another folder")
-    module = DeployedPolicy(layers, scaling)
-    generator = torch.Generator().manual_seed(0)
-    sizes = (sum(OBSERVED[name] for name in description["observes"]), description["latent_size"])
-    examples = [3.0 * torch.randn((64, size), generator=generator) for size in sizes]
-    policy = to_onnx(module, [x[:2] for x in examples], ["state", "latent"], "action")
-    compare(module, policy, POLICY, examples, ["state", "latent"])
+    policy = _export_policy(layers, scaling, description)
     models = {POLICY: policy} if encoder is None else {ENCODER: encoder, POLICY: policy}
     manifest = {
         "format": FORMAT,
-        "task": "contactsafe/Wiping-v0",
         **description,
         "actions": list(ACTIONS),
         "observation_scaling": scaling.as_dict(),
         "files": {name: {"bytes": len(data), "sha256": digest(data)} for name, data in models.items()},
         "versions": {name: version(name) for name in ("torch", "stable-baselines3", "onnx", "onnxruntime", "numpy")},
     }
+    _write(folder, models, manifest)
+    return folder
+
+
+def _export_policy(layers: nn.Module, scaling: ObservationScaling, description: dict[str, Any]) -> bytes:
+    """Return the policy as ONNX, after comparing it with torch."""
+    module = DeployedPolicy(layers, scaling)
+    generator = torch.Generator().manual_seed(0)
+    sizes = {"state": sum(vector["size"] for vector in description["observes"]), "latent": description["latent_size"]}
+    inputs = [name for name, size in sizes.items() if size]
+    examples = [3.0 * torch.randn((64, sizes[name]), generator=generator) for name in inputs]
+    policy = to_onnx(module, [x[:2] for x in examples], inputs, "action")
+    compare(module, policy, POLICY, examples, inputs)
+    return policy
+
+
+def _write(folder: Path, models: dict[str, bytes], manifest: dict[str, Any]) -> None:
+    """Write all files beside the folder, read them back, and put them in its place."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
@@ -199,10 +226,9 @@ def export_bundle(folder, encoder, layers, scaling, description, force=False):
         raise OutputError(f"cannot write {folder}: {error}; nothing was changed") from error
     finally:
         shutil.rmtree(staged, ignore_errors=True)
-    return folder
 
 
-def _put_in_place(staged, folder):
+def _put_in_place(staged: Path, folder: Path) -> None:
     """Rename; a folder that was there is moved aside first and brought back if that fails.
 
     What somebody else has put into it comes along.

@@ -1,17 +1,22 @@
-"""Settings that every way of training a policy shares, and what an algorithm must say of itself."""
+"""Settings that all training of policies has in common, and what an algorithm must say of itself."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.core.parse import one_of, some_of
-from contactsafe.policy.observation import SCALES
-from contactsafe.tasks import ENGINES
+from contactsafe.core.parse import one_of
+from contactsafe.tasks import DEFAULT_TASK, TASKS
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+    from torch import nn
+
+    from contactsafe.learning.vec_env import EncodedVecEnv
 
 SESSION_FIELDS = (
-    "vae",
+    "encoder",
     "out",
     "resume",
     "total_steps",
@@ -31,11 +36,12 @@ class PolicyConfig:
     `PpoConfig`.
 
     Attributes:
-        vae: folder of the eyes, as `contactsafe train vae` leaves them (vae.json; encoder.onnx where it is learned).
+        encoder: folder of the vision encoder that `contactsafe train vae` leaves (encoder.json, and encoder.onnx where
+            it is learned); not read for a task without camera, and from Python None for a policy that sees no images.
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
-        env_id: Gymnasium id of the task; from Python, any that gives the same observations.
-        randomise: train on worlds that differ from episode to episode; held-out boards are wiped in the nominal one.
+        task: what is learned; from Python, any name for the environments that are handed over.
+        randomise: train on worlds that differ from episode to episode; held-out episodes are of the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
         max_minutes: stop after this long in this session, keep a checkpoint and export what there is; 0 for no limit.
@@ -46,23 +52,23 @@ class PolicyConfig:
         discount: the paper's γ of RL, for one environment step; raised to action_repeat.
         net: widths of the hidden layers, of policy and of value network.
         action_repeat: environment steps for which one action is given.
-        scan: amplitude of the steady motion laid over the actions, in training and ever after; 0 for none.
+        dither: amplitude of the steady motion added to the actions, in training and ever after; 0 for none.
         reward_scale: rewards are multiplied by this before learning; logs are not.
-        observes: what the policy takes besides the picture: pose (the paper's), target (x_d, K1 and D1 as they are
-            now) and force; without the latter two it can neither know how stiff it is nor feel what it touches.
+        observes: vectors that the policy takes besides images, such as pose (the paper's), target (x_d, K1 and D1 as
+            they are now) and force, each after a space; none for all that the task offers.
         rate_hz: of environment steps.
-        evaluate_episodes: on boards never trained on, at the end; 0 for none.
-        seed: of weights, exploration and boards.
+        evaluate_episodes: held-out ones, at the end; 0 for none.
+        seed: of weights, exploration and episodes.
         threads: torch's. More than one crawls as soon as anything else wants a core.
         encoder_threads: ONNX Runtime's.
     """
 
     algorithm: ClassVar[str]
 
-    vae: Path = Path("runs/vae")
+    encoder: Path | None = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
-    env_id: Annotated[str, one_of(ENGINES.values())] = "contactsafe/Wiping-v0"
+    task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
@@ -73,16 +79,16 @@ class PolicyConfig:
     discount: float = 0.995
     net: tuple[int, ...] = (256, 128)
     action_repeat: int = 1
-    scan: float = 0.3
+    dither: float = 0.3
     reward_scale: float = 1.0
-    observes: Annotated[tuple[str, ...], some_of(SCALES, " ")] = ("pose", "target", "force")
+    observes: tuple[str, ...] = ()
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
     threads: int = 1
     encoder_threads: int = 2
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse numbers with which nothing can be trained."""
         for name in (
             "num_envs",
@@ -98,34 +104,33 @@ class PolicyConfig:
         for name in ("max_minutes", "evaluate_episodes", "seed"):
             if not getattr(self, name) >= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 0 or more")
-        unknown = [name for name in self.observes if name not in SCALES]
-        if unknown or len(set(self.observes)) < len(self.observes):
-            raise InvalidInputError(f"observes = {self.observes}; give some of {', '.join(SCALES)}, each once")
+        if len(set(self.observes)) < len(self.observes):
+            raise InvalidInputError(f"observes = {self.observes}; give each vector once")
         if not 0.0 < self.discount <= 1.0:
             raise InvalidInputError(f"discount = {self.discount}; give more than 0, at most 1")
 
-    def make_model(self, env: Any) -> Any:
+    def make_model(self, env: "EncodedVecEnv") -> "BaseAlgorithm":
         """Make an untrained model of Stable-Baselines3, on the CPU, seeded.
 
         Args:
-            env: the EncodedVecEnv.
+            env: what it learns in.
         """
         raise NotImplementedError
 
-    def actor(self, model: Any) -> Any:
-        """Give the part of a model that acts without exploring: a torch module, (N, observation) to (N, 18).
+    def actor(self, model: "BaseAlgorithm") -> "nn.Module":
+        """Return the part of a model that acts without exploring: a torch module, (N, observation) to (N, 18).
 
         Actions are clipped to [-1, 1] by who uses it.
         """
         raise NotImplementedError
 
-    def prepare_rollout(self, model: Any) -> None:
+    def prepare_rollout(self, model: "BaseAlgorithm") -> None:
         """Set what changes with the steps done, before a rollout; nothing by default.
 
         Args:
-            model: as `make_model` gave it; its `num_timesteps` say how far it is.
+            model: as `make_model` returned it; its `num_timesteps` say how far it is.
         """
 
     def falling_rate(self) -> Callable[[float], float]:
-        """Give the learning rate by the share of total_steps still ahead: absolute, so a resumed run has the same."""
+        """Return the learning rate over the fraction of total_steps that is left: a resumed run has the same."""
         return lambda remaining: self.learning_rate * max(remaining, 0.05)

@@ -1,4 +1,4 @@
-"""What a latent still says: ink recall and precision by amount of ink, and where the nearest ink is."""
+"""What can be read off a latent: recall and precision by amount of foreground, and where the nearest of it is."""
 
 from itertools import pairwise
 
@@ -7,93 +7,104 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from contactsafe.learning.datasets import MaskDataset
+from contactsafe.learning.encoder import VAE
+
 BINS = (0.0, 0.001, 0.0025, 0.005, 0.01, 0.02, 1.0)
-"""Edges of the classes of pictures: share of pixels that are ink."""
+"""Edges of the classes of pictures: fraction of pixels that are foreground."""
 
 NEAR = 2
 """Pixels by which a reconstruction may be off and still count in the tolerant figures."""
 
 
-def batches(count, size=256):
+def batches(count: int, size: int = 256) -> list[np.ndarray]:
     """Split range(count) into index arrays of at most size."""
     return [np.arange(start, min(start + size, count)) for start in range(0, count, size)]
 
 
 @torch.no_grad()
-def reconstruction_report(vae, data):
-    """Compare reconstructed ink (probability above a half) with what was there.
+def reconstruction_report(vae: VAE, data: MaskDataset) -> dict[str, dict[str, float]]:
+    """Compare the reconstructed foreground (probability above a half) with what was there.
 
     Args:
         vae: the network.
         data: a MaskDataset.
 
     Returns:
-        For "all" and for each class "0.001-0.0025" of ink share: pictures, recall, precision and both again within
-        NEAR pixels, pooled over the pixels of the class. Classes without a picture are left out.
+        For "all" and for each class "0.001-0.0025" of foreground fraction: images, recall, precision and both again
+        within NEAR pixels, pooled over the pixels of the class. Classes without an image are left out.
     """
     rows = []
     for index in batches(len(data)):
-        ink = torch.from_numpy(data.ink(index))
-        guess = (vae.decode(vae.encode(ink)[0]) > 0.0).float()
-        wide_ink, wide_guess = (functional.max_pool2d(x, 2 * NEAR + 1, 1, NEAR) for x in (ink, guess))
-        sums = [ink, guess, ink * guess, ink * wide_guess, guess * wide_ink]
+        image = torch.from_numpy(data.images(index))
+        guess = (vae.decode(vae.encode(image)[0]) > 0.0).float()
+        wide_image, wide_guess = (functional.max_pool2d(x, 2 * NEAR + 1, 1, NEAR) for x in (image, guess))
+        sums = [image, guess, image * guess, image * wide_guess, guess * wide_image]
         rows.append(torch.stack([s.sum((1, 2, 3)) for s in sums], dim=1).numpy())
     counts = np.concatenate(rows).astype(np.float64)
-    share = counts[:, 0] / (vae.config.size**2)
+    fraction = counts[:, 0] / (vae.config.size**2)
     report = {"all": _figures(counts)}
     for low, high in pairwise(BINS):
-        chosen = (share > low) & (share <= high)
+        chosen = (fraction > low) & (fraction <= high)
         if chosen.any():
             report[f"{low:g}-{high:g}"] = _figures(counts[chosen])
     return report
 
 
-def _figures(counts):
-    ink, guess, both, near_ink, near_guess = counts.sum(0)
+def _figures(counts: np.ndarray) -> dict[str, float]:
+    there, guess, both, near_there, near_guess = counts.sum(0)
     return {
-        "pictures": len(counts),
-        "recall": float(both / max(ink, 1)),
+        "images": len(counts),
+        "recall": float(both / max(there, 1)),
         "precision": float(both / max(guess, 1)),
-        "recall_near": float(near_ink / max(ink, 1)),
+        "recall_near": float(near_there / max(there, 1)),
         "precision_near": float(near_guess / max(guess, 1)),
     }
 
 
-def nearest_ink(ink, window_m):
-    """Give the vector from the centre of each picture to its nearest ink.
+def nearest_foreground(image: np.ndarray, window_m: float) -> np.ndarray:
+    """Return the vector from the centre of each image to its nearest foreground pixel.
 
     Args:
-        ink: (N, 1, size, size), 1 is ink.
-        window_m: side of the picture, m.
+        image: (N, 1, size, size), 1 is foreground.
+        window_m: side of the image, m.
 
     Returns:
-        Vectors, (N, 2), m, columns first; NaN where there is no ink.
+        Vectors, (N, 2), m, columns first; NaN where there is none.
     """
-    size = ink.shape[-1]
+    size = image.shape[-1]
     axis = ((np.arange(size) + 0.5) / size - 0.5) * window_m
     distance = axis[:, None] ** 2 + axis[None, :] ** 2
-    nearest = np.where(ink[:, 0] > 0, distance, np.inf).reshape(len(ink), -1).argmin(1)
+    nearest = np.where(image[:, 0] > 0, distance, np.inf).reshape(len(image), -1).argmin(1)
     vectors = np.stack([axis[nearest % size], axis[nearest // size]], axis=1)
-    vectors[ink.reshape(len(ink), -1).max(1) == 0] = np.nan
+    vectors[image.reshape(len(image), -1).max(1) == 0] = np.nan
     return vectors
 
 
-def nearest_ink_error(vae, data, held_out, window_m, steps, seed, count=20_000):
-    """Fit a small network from latent to nearest ink and say how far off it is on held-out pictures.
+def nearest_foreground_error(
+    vae: VAE,
+    data: MaskDataset,
+    held_out: MaskDataset,
+    window_m: float,
+    steps: int,
+    seed: int,
+    count: int = 20_000,
+) -> dict[str, float]:
+    """Fit a small network from latent to nearest foreground and say how far off it is on held-out images.
 
     The policy has to do the same and no more; what this cannot read, PPO will not learn.
 
     Args:
         vae: the network.
-        data: pictures to fit on.
-        held_out: pictures to report on.
-        window_m: side of the picture, m.
-        steps: of Adam, 256 pictures each.
+        data: images to fit on.
+        held_out: images to report on.
+        window_m: side of the image, m.
+        steps: of Adam, 256 images each.
         seed: of weights and order.
-        count: pictures of data to use at most.
+        count: images of data to use at most.
 
     Returns:
-        "median_mm" and "p90_mm" of the error; "direction_p90_deg", of the direction, where ink is 3 cm away or more;
+        "median_mm" and "p90_mm" of the error; "direction_p90_deg", of the direction, where that is 3 cm away or more;
         "guess_median_mm" of always naming the mean.
     """
     generator = torch.Generator().manual_seed(seed)
@@ -132,12 +143,12 @@ def nearest_ink_error(vae, data, held_out, window_m, steps, seed, count=20_000):
 
 
 @torch.no_grad()
-def _pairs(vae, data, window_m, count):
+def _pairs(vae: VAE, data: MaskDataset, window_m: float, count: int) -> tuple[torch.Tensor, torch.Tensor]:
     latents, vectors = [], []
     for index in batches(min(count, len(data))):
-        ink = data.ink(index)
-        latents.append(vae.encode(torch.from_numpy(ink))[0])
-        vectors.append(torch.from_numpy(nearest_ink(ink, window_m)).float())
+        image = data.images(index)
+        latents.append(vae.encode(torch.from_numpy(image))[0])
+        vectors.append(torch.from_numpy(nearest_foreground(image, window_m)).float())
     latents, vectors = torch.cat(latents), torch.cat(vectors)
     seen = torch.isfinite(vectors[:, 0])
     return latents[seen], vectors[seen]

@@ -5,7 +5,9 @@ import itertools
 import os
 import socket
 import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
@@ -16,6 +18,7 @@ from tqdm import tqdm
 
 from contactsafe.core.copying import OfTraining
 from contactsafe.core.files import cannot_write
+from contactsafe.learning.run import Run
 
 
 class EventFile(OfTraining):
@@ -31,7 +34,7 @@ class EventFile(OfTraining):
 
     _number = itertools.count()
 
-    def __init__(self, folder, hidden_from=None):
+    def __init__(self, folder: Path | str, hidden_from: int | None = None):
         name = f"events.out.tfevents.{int(time.time())}.{socket.gethostname()}.{os.getpid()}.{next(self._number)}"
         self._path = Path(folder) / name
         with self._told():
@@ -41,23 +44,23 @@ class EventFile(OfTraining):
         if hidden_from is not None:
             self._add(step=hidden_from, session_log=event_pb2.SessionLog(status=event_pb2.SessionLog.START))
 
-    def write(self, numbers, step):
+    def write(self, numbers: Mapping[str, Any], step: int) -> None:
         """Write numbers by name as the points of a step."""
         values = [summary_pb2.Summary.Value(tag=name, simple_value=value) for name, value in numbers.items()]
         self._add(step=step, summary=summary_pb2.Summary(value=values))
 
-    def close(self):
+    def close(self) -> None:
         """Close the file."""
         with self._told():
             self._file.close()
 
-    def _add(self, **event):
+    def _add(self, **event: Any) -> None:
         with self._told():
             self._writer.write(event_pb2.Event(wall_time=time.time(), **event).SerializeToString())
             self._file.flush()
 
     @contextlib.contextmanager
-    def _told(self):
+    def _told(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
@@ -72,21 +75,21 @@ class Curves(OfTraining, KVWriter):
         steps: at which the session begins.
     """
 
-    def __init__(self, folder, steps):
+    def __init__(self, folder: Path | str, steps: int):
         _let_the_second_pass(folder)
         self._events = EventFile(folder, hidden_from=steps + 1)
 
-    def write(self, key_values, key_excluded, step=0):
+    def write(self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0) -> None:
         """Write numbers; they are on disk before the checkpoint that follows."""
         shown = {key: value for key, value in key_values.items() if "tensorboard" not in (key_excluded.get(key) or ())}
         self._events.write(shown, step)
 
-    def close(self):
+    def close(self) -> None:
         """Close the file."""
         self._events.close()
 
 
-def _let_the_second_pass(folder):
+def _let_the_second_pass(folder: Path | str) -> None:
     """Wait until a new log comes after those that are there: TensorBoard goes by the second in their names."""
     begun = [int(path.name.split(".")[3]) for path in Path(folder).glob("events.out.tfevents.[0-9]*.*")]
     left = max(begun, default=0) + 1 - time.time()
@@ -102,7 +105,7 @@ class Recorder(OfTraining, BaseCallback):
         minutes_before: trained in earlier sessions.
     """
 
-    def __init__(self, run, minutes_before):
+    def __init__(self, run: Run, minutes_before: float):
         super().__init__()
         self.run = run
         self.config = run.config
@@ -110,25 +113,25 @@ class Recorder(OfTraining, BaseCallback):
         self.started = time.monotonic()
         self.period = run.config.rollout_steps * run.config.num_envs
         self.over = False
-        self.bar = tqdm(disable=True)
+        self.bar: tqdm = tqdm(disable=True)
 
-    def minutes(self):
+    def minutes(self) -> float:
         """Time trained over all sessions, min."""
         return self.minutes_before + self._session_minutes()
 
-    def finish(self):
+    def finish(self) -> None:
         """Log and save the last rollout, unless that was done."""
         if not self.over and self.model.num_timesteps > self.run.saved_steps:
             self._close_rollout()
         self.logger.close()
 
-    def _on_training_start(self):
+    def _on_training_start(self) -> None:
         name = self.config.algorithm.upper()
         self.bar = tqdm(
             total=self.config.total_steps, initial=self.model.num_timesteps, desc=name, unit="step", mininterval=1.0
         )
 
-    def _on_rollout_start(self):
+    def _on_rollout_start(self) -> None:
         # The one place where Stable-Baselines3 calls back with nothing half done: no rollout begun, no update pending.
         limit = self.config.max_minutes
         self.over = bool(limit) and self._session_minutes() >= limit
@@ -137,27 +140,28 @@ class Recorder(OfTraining, BaseCallback):
             self._close_rollout()
         self.config.prepare_rollout(self.model)
 
-    def _on_step(self):
+    def _on_step(self) -> bool:
         self.bar.update(self.training_env.num_envs)
         return not self.over
 
-    def _on_training_end(self):
+    def _on_training_end(self) -> None:
         self.bar.close()
 
-    def _session_minutes(self):
+    def _session_minutes(self) -> float:
         return (time.monotonic() - self.started) / 60.0
 
-    def _close_rollout(self):
+    def _close_rollout(self) -> None:
         if self.model.num_timesteps:
             self._log()
         self.run.save(self.minutes())
 
-    def _log(self):
-        finished = self.training_env.finished
+    def _log(self) -> None:
+        finished = self.run.env.finished
         for key in finished[-1] if finished else ():
             self.logger.record(f"episode/{key}", float(np.mean([episode[key] for episode in finished])))
         self.logger.record("time/minutes", self.minutes())
         if finished:
-            recent = {key: np.mean([episode[key] for episode in finished]) for key in ("success", "ink_left", "return")}
+            shown = ("success", *self.run.env.metric_names[:1], "return")
+            recent = {key: np.mean([episode[key] for episode in finished]) for key in shown}
             self.bar.set_postfix({key: f"{value:.2f}" for key, value in recent.items()}, refresh=False)
         self.model.dump_logs()

@@ -1,7 +1,9 @@
 """The memory of an off-policy algorithm on disk: a file that grows by what is new, whole at every moment."""
 
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +28,7 @@ class ReplayFile(OfTraining):
         slack: most rows added between two checkpoints.
     """
 
-    def __init__(self, path, buffer, slack):
+    def __init__(self, path: Path | str, buffer: Any, slack: int):
         self.path = Path(path)
         self.buffer = buffer
         self.ring = buffer.buffer_size + slack
@@ -35,8 +37,8 @@ class ReplayFile(OfTraining):
         self.sealed = np.dtype([("row", self.row), ("seal", np.uint32)])
         self.rows = 0
 
-    def save(self):
-        """Write what was added since the last time; give the number of rows since the beginning.
+    def save(self) -> int:
+        """Write what was added since the last time; return the number of rows since the beginning.
 
         Raises:
             OutputError: the file cannot be written.
@@ -56,7 +58,7 @@ class ReplayFile(OfTraining):
         self.rows += new
         return self.rows
 
-    def check(self, rows):
+    def check(self, rows: int) -> None:
         """Make sure that the file holds what it held when so many rows had been written.
 
         Raises:
@@ -66,7 +68,7 @@ class ReplayFile(OfTraining):
             if not all(np.isfinite(row[name]).all() for name in FIELDS):
                 raise InvalidInputError(f"{self.path}: row {index} is not finite; start anew with another --out")
 
-    def load(self, rows):
+    def load(self, rows: int) -> None:
         """Fill the buffer as it was when rows had been written.
 
         Raises:
@@ -78,8 +80,8 @@ class ReplayFile(OfTraining):
                 getattr(self.buffer, name)[index % size] = row[name]
         self.rows, self.buffer.pos, self.buffer.full = rows, rows % size, rows >= size
 
-    def _stored(self, rows):
-        """Give number and content of each row that the buffer held when so many had been written."""
+    def _stored(self, rows: int) -> Iterator[tuple[int, np.void]]:
+        """Yield number and content of each row that the buffer held when so many had been written."""
         held = min(rows, self.ring)
         if not held:
             return
@@ -94,6 +96,6 @@ class ReplayFile(OfTraining):
             yield index, row["row"]
 
 
-def _seal(row, index):
-    """Give the checksum of a row and of its number: a row of an earlier round in the ring is another."""
+def _seal(row: Any, index: int) -> int:
+    """Compute the checksum of a row and of its number: a row of an earlier round in the ring is another."""
     return zlib.crc32(row.tobytes(), index & 0xFFFFFFFF)

@@ -1,48 +1,42 @@
-"""A training run on disk: all that decides how it goes on, saved between updates and put back to the bit."""
+"""A training run on disk: all that decides how it goes on, saved between updates and loaded to the bit."""
 
 import math
-from collections import deque
 from copy import deepcopy
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.save_util import recursive_getattr
 
 from contactsafe.core.copying import OfTraining
 from contactsafe.core.errors import InvalidInputError, shown
-from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, part, whole
-from contactsafe.learning.checkpoints import (
-    check_random_state,
-    check_same_config,
-    check_unchanged,
-    load_checkpoint,
-    pack,
-    plain,
-    random_state,
-    refused_as,
-    restore_random_state,
-    save_checkpoint,
-    unpack,
-)
-from contactsafe.learning.policy_config import SESSION_FIELDS
+from contactsafe.core.state import generator_state
+from contactsafe.learning import sb3
+from contactsafe.learning.checking import CheckpointError, check_like, check_optimiser, check_tensor, entry, whole
+from contactsafe.learning.checkpoints import load_checkpoint, refused_as, save_checkpoint
+from contactsafe.learning.packing import pack, unpack
+from contactsafe.learning.policy_config import SESSION_FIELDS, PolicyConfig
+from contactsafe.learning.random_state import check_random_state, load_random_state, random_state
 from contactsafe.learning.replay import ReplayFile
-from contactsafe.sim.snapshot import generator_state
+from contactsafe.learning.settings import check_same_config, check_unchanged, plain
 
-FORMAT = 4
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+    from contactsafe.learning.vec_env import EncodedVecEnv
+
+FORMAT = 5
 """Version of the checkpoint's layout."""
 
-COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
 
-
-def load_run(config, encoder_digest):
+def load_run(config: PolicyConfig, encoder_digest: str) -> dict[str, Any]:
     """Read the checkpoint of a run and make sure that it is this run's.
 
     Args:
-        config: a PolicyConfig.
-        encoder_digest: SHA-256 of the encoder it would go on with.
+        config: the settings now.
+        encoder_digest: SHA-256 of the encoder it would go on with, empty where it has none.
 
     Returns:
-        The state for `Run.restore`.
+        The state for `Run.load_state_dict`.
 
     Raises:
         InvalidInputError: it cannot be read, or is of another version, algorithm, encoder, or of other settings.
@@ -51,8 +45,8 @@ def load_run(config, encoder_digest):
     if state.get("format") != FORMAT:
         raise InvalidInputError(f"{config.out} holds a run of another version; start anew with another --out")
     with refused_as(config.out):
-        algorithm, encoder = part(state, "algorithm", str), part(state, "encoder", str)
-        settings = part(state, "config", dict)
+        algorithm, encoder = entry(state, "algorithm", str), entry(state, "encoder", str)
+        settings = entry(state, "config", dict)
     if algorithm != config.algorithm:
         raise InvalidInputError(
             f"{config.out} holds a run of {shown(algorithm)[1:-1]}, not of {config.algorithm}; give another --out"
@@ -61,43 +55,46 @@ def load_run(config, encoder_digest):
         check_same_config(settings, config, SESSION_FIELDS)
     if encoder != encoder_digest:
         raise InvalidInputError(
-            f"the encoder in {config.vae} is not the one that the run in {config.out} was started with; "
-            "give that one's folder as --vae, or start anew with another --out"
+            f"the encoder in {config.encoder} is not the one that the run in {config.out} was started with; "
+            "give that one's folder as --encoder, or start anew with another --out"
         )
     return state
 
 
 class Run(OfTraining):
-    """Saves and restores a model of Stable-Baselines3 together with its environment.
+    """Saves and loads a model of Stable-Baselines3 together with its environment.
 
     Args:
-        config: the PolicyConfig.
+        config: the settings.
         model: made by it.
-        env: the EncodedVecEnv the model learns in.
-        encoder_digest: SHA-256 of the encoder.
+        env: the environment the model learns in.
+        encoder_digest: SHA-256 of the encoder, empty where there is none.
 
     Attributes:
         saved_steps: steps of the policy at the last checkpoint; −1 before the first.
     """
 
-    def __init__(self, config, model, env, encoder_digest):
+    def __init__(self, config: PolicyConfig, model: "BaseAlgorithm", env: "EncodedVecEnv", encoder_digest: str):
+        sb3.check_version()
         self.config, self.model, self.env = config, model, env
         self.encoder_digest = encoder_digest
         self.saved_steps = -1
         tasks = getattr(env.env.unwrapped, "tasks", None)
-        self.task = {} if tasks is None else {"task": plain(tasks.config)}
-        buffer = getattr(model, "replay_buffer", None)
-        slack = config.rollout_steps + model.train_freq.frequency if buffer is not None else 0
-        self.replay = None if buffer is None else ReplayFile(config.out / "replay.bin", buffer, slack)
+        self.task: dict[str, Any] = {} if tasks is None else {"task": plain(tasks.config)}
+        slack = sb3.replay_slack(model, config.rollout_steps)
+        self.replay = None
+        if slack is not None:
+            self.replay = ReplayFile(config.out / "replay.bin", model.replay_buffer, slack)
 
-    def save(self, minutes):
+    def save(self, minutes: float) -> None:
         """Write the checkpoint; call it between updates, when policy and optimiser fit together.
 
         Args:
             minutes: trained so far, over all sessions.
         """
         model = self.model
-        _, variables = model._get_torch_save_params()
+        episodes, successes = sb3.recent_episodes(model)
+        observation, starts = sb3.last_step(model)
         state = {
             "format": FORMAT,
             "algorithm": self.config.algorithm,
@@ -106,87 +103,78 @@ class Run(OfTraining):
             "task": self.task,
             "minutes": minutes,
             "parameters": model.get_parameters(),
-            "variables": {name: getattr(model, name).detach() for name in variables},
-            "counters": {name: getattr(model, name) for name in COUNTERS},
-            "episodes": list(model.ep_info_buffer),
-            "successes": list(model.ep_success_buffer),
+            "variables": sb3.variables(model),
+            "counters": sb3.counters(model),
+            "episodes": episodes,
+            "successes": successes,
             "random": random_state(),
             "random_actions": generator_state(model.action_space.np_random),
             "replay_rows": self.replay.save() if self.replay else 0,
-            "env": pack(
-                {
-                    "below": self.env.snapshot(),
-                    "observation": model._last_obs,
-                    "starts": model._last_episode_starts,
-                }
-            ),
+            "env": pack({"below": self.env.state_dict(), "observation": observation, "starts": starts}),
         }
         save_checkpoint(self.config.out, state)
         self.saved_steps = model.num_timesteps
 
-    def restore(self, state):
-        """Put model and environment back to where a checkpoint left them; give the minutes it had trained.
+    def load_state_dict(self, state: dict[str, Any]) -> float:
+        """Load model and environment from a checkpoint and return the minutes it had trained.
 
         Raises:
             InvalidInputError: the run was started on another task, such as one with another reward, or the checkpoint
                 holds what this run cannot have written; then nothing is changed.
         """
         with refused_as(self.config.out):
-            check_unchanged(part(state, "task", dict), self.task)
+            check_unchanged(entry(state, "task", dict), self.task)
             env = self._check(state)
         model = self.model
         if self.replay:
             self.replay.load(state["replay_rows"])
         model.set_parameters(state["parameters"], exact_match=True)
-        for name, value in state["variables"].items():
-            getattr(model, name).data.copy_(value)
-        for name, value in state["counters"].items():
-            setattr(model, name, value)
-        model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
-        model.ep_success_buffer = deque(state["successes"], maxlen=model._stats_window_size)
+        sb3.load_variables(model, state["variables"])
+        sb3.load_counters(model, state["counters"])
+        sb3.load_recent_episodes(model, state["episodes"], state["successes"])
         model.action_space.np_random.bit_generator.state = state["random_actions"]
-        self.env.restore(env["below"])
+        self.env.load_state_dict(env["below"])
         if self.env.keeps_worlds:
-            model._last_obs, model._last_episode_starts = env["observation"], env["starts"]
+            sb3.load_last_step(model, env["observation"], env["starts"])
         else:
             self.env.seed(self.config.seed + 7919 * (1 + model.num_timesteps))
-        restore_random_state(state["random"])
+        load_random_state(state["random"])
         self.saved_steps = model.num_timesteps
-        return state["minutes"]
+        return float(state["minutes"])
 
-    def _check(self, state):
-        """Refuse what `save` cannot have written for such a model and environment; give the environment's."""
-        model = self.model
-        self._check_parameters(part(state, "parameters", dict))
-        _, variables = model._get_torch_save_params()
-        check_like(
-            part(state, "variables", dict), {name: getattr(model, name).detach() for name in variables}, "variables"
-        )
-        counters = part(state, "counters", dict)
-        for name in COUNTERS:
+    def _check(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Refuse what `save` cannot have written for such a model and environment; return the environment's."""
+        self._check_parameters(entry(state, "parameters", dict))
+        check_like(entry(state, "variables", dict), sb3.variables(self.model), "variables")
+        counters = entry(state, "counters", dict)
+        for name in sb3.COUNTERS:
             whole(counters, name)
-        minutes = part(state, "minutes", (int, float))
+        minutes = entry(state, "minutes", (int, float))
         if not (math.isfinite(minutes) and minutes >= 0.0):
             raise CheckpointError(f"minutes = {shown(minutes)}")
-        for name, most in (("episodes", model._stats_window_size), ("successes", model._stats_window_size)):
-            if len(part(state, name, list)) > most:
+        self._check_recent(state)
+        check_random_state(entry(state, "random", dict))
+        self._check_random_actions(entry(state, "random_actions", dict))
+        rows = whole(state, "replay_rows")
+        if self.replay:
+            self.replay.check(rows)
+        return self._check_env(unpack(entry(state, "env", dict)))
+
+    def _check_recent(self, state: dict[str, Any]) -> None:
+        most = sb3.recent_length(self.model)
+        for name in ("episodes", "successes"):
+            if len(entry(state, name, list)) > most:
                 raise CheckpointError(f"{name} has {len(state[name])} entries, at most {most}")
         check_like(state["episodes"], len(state["episodes"]) * [{"r": 0.0, "l": 0, "t": 0.0}], "episodes")
         if not all(isinstance(success, bool | int | float) for success in state["successes"]):
             raise CheckpointError(f"successes are {shown(state['successes'])}")
-        check_random_state(part(state, "random", dict))
-        self._check_random_actions(part(state, "random_actions", dict))
-        rows = whole(state, "replay_rows")
-        if self.replay:
-            self.replay.check(rows)
-        return self._check_env(unpack(part(state, "env", dict)))
 
-    def _check_parameters(self, parameters):
+    def _check_parameters(self, parameters: dict[str, Any]) -> None:
         wanted = self.model.get_parameters()
         if set(parameters) != set(wanted):
             raise CheckpointError(f"parameters are {shown(sorted(map(str, parameters)))}, not {shown(sorted(wanted))}")
         for name, value in wanted.items():
-            kept = recursive_getattr(self.model, name)
+            kept = sb3.component(self.model, name)
             if isinstance(kept, torch.optim.Optimizer):
                 check_optimiser(parameters[name], kept, f"parameters.{name}")
             elif isinstance(value, torch.Tensor):
@@ -194,17 +182,17 @@ class Run(OfTraining):
             else:
                 check_like(parameters[name], dict(value), f"parameters.{name}")
 
-    def _check_random_actions(self, state):
+    def _check_random_actions(self, state: dict[str, Any]) -> None:
         generator = deepcopy(self.model.action_space.np_random.bit_generator)
         try:
             generator.state = state
         except (KeyError, TypeError, ValueError, OverflowError):
             raise CheckpointError("random_actions is not a state of its generator") from None
 
-    def _check_env(self, env):
+    def _check_env(self, env: dict[str, Any]) -> dict[str, Any]:
         """Check what decides the environment's future, and the observation it gave last."""
         try:
-            self.env.check(part(env, "below", dict))
+            self.env.check(entry(env, "below", dict))
         except InvalidInputError as error:
             raise CheckpointError(str(error).removesuffix("; start anew")) from None
         if self.env.keeps_worlds:
@@ -213,7 +201,7 @@ class Run(OfTraining):
                 ("observation", (n, *space.shape), space.dtype),
                 ("starts", (n,), np.dtype(bool)),
             ):
-                array = part(env, name, np.ndarray)
+                array = entry(env, name, np.ndarray)
                 if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
                     raise CheckpointError(f"{name} is {array.dtype} of shape {array.shape}, or not finite")
         return env

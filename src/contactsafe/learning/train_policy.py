@@ -1,156 +1,131 @@
-"""Train a policy on [pose, latent] with any algorithm of Stable-Baselines3, the free-space controller underneath."""
+"""Train a policy on what a task lets it observe, with any algorithm of Stable-Baselines3; export and evaluate it."""
 
-import json
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
-import gymnasium
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
-from contactsafe.core.errors import BundleError, InvalidInputError, shown
-from contactsafe.learning.checkpoints import CHECKPOINT, plain, run_folder, write_json
+from contactsafe.learning.checkpoints import run_folder, write_json
 from contactsafe.learning.export import export_bundle
+from contactsafe.learning.policy_config import PolicyConfig
 from contactsafe.learning.recorder import Curves, Recorder
 from contactsafe.learning.run import Run, load_run
+from contactsafe.learning.settings import plain
 from contactsafe.learning.vec_env import EncodedVecEnv
-from contactsafe.policy.bundle import (
-    ENCODER,
-    FOLDER,
-    MAX_LATENT,
-    MAX_MANIFEST_BYTES,
-    MAX_MODEL_BYTES,
-    digest,
-    read_bounded,
-)
-from contactsafe.policy.dither import Scan
-from contactsafe.policy.graph import check_ports, read_graph
-from contactsafe.policy.observation import ObservationScaling
-from contactsafe.policy.perception import (
-    EYES_FORMAT,
-    LEARNED,
-    REPRESENTATIONS,
-    Perception,
-    encoder_ports,
-    open_session,
-)
+from contactsafe.learning.vision_encoder import VisionEncoder
+from contactsafe.policy.bundle import FOLDER
+from contactsafe.policy.dither import Dither
+from contactsafe.policy.observation import ObservationScaling, chosen
+from contactsafe.policy.perception import NO_IMAGE
 from contactsafe.policy.policy import Policy
+from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
 
+MakeEnv = Callable[[int], Any]
+"""`make_env(num_envs)` returns a task's vector environment."""
 
-def train_policy(config, make_env=None, make_held_out=None):
-    """Train, export a bundle, and evaluate it on held-out boards.
+
+def train_policy(
+    config: PolicyConfig, make_env: MakeEnv | None = None, make_held_out: MakeEnv | None = None
+) -> dict[str, Any]:
+    """Train, export a bundle, and evaluate it on held-out episodes.
 
     Killed at any moment and resumed, a run ends with the same weights as one that was left alone: on one machine, with
-    the same versions, as many threads, and an environment that has `snapshot` and `restore`.
+    the same versions, as many threads, and an environment that has `state_dict` and `load_state_dict`.
 
     Args:
-        config: a PolicyConfig of some algorithm, such as PpoConfig.
-        make_env: `make_env(num_envs)` gives the vector environment; None makes config.env_id through Gymnasium.
-        make_held_out: the same for the boards of the evaluation; None takes make_env.
+        config: settings of some algorithm, such as PpoConfig.
+        make_env: makes the environments; None for those of config.task, as `contactsafe train` makes them. They have
+            `observation_vectors`, and where the policy sees their mask `camera_homography`.
+        make_held_out: the same for the evaluation; None takes make_env, or the task's where that is None.
 
     Returns:
-        The results written into the bundle, a dict.
+        The results written into the bundle.
 
     Raises:
-        InvalidInputError: no encoder in config.vae, nothing to resume, or the run was started otherwise.
+        InvalidInputError: no encoder in config.encoder, nothing to resume, or the run was started otherwise.
         OutputError: out cannot be written, or holds another run.
     """
-    eyes = _Eyes.load(config.vae)
-    make_env = make_env or (lambda num_envs: gymnasium.make_vec(config.env_id, num_envs=num_envs))
+    if make_env is None:
+        make_env, usual_held_out = _environments(config)
+        make_held_out = make_held_out or usual_held_out
+    encoder = _encoder(config)
     with run_folder(config.out, config.resume) as out:
-        return _train(config, eyes, make_env, make_held_out or make_env, out)
+        return _train(config, encoder, make_env, make_held_out or make_env, out)
 
 
-def _train(config, eyes, make_env, make_held_out, out):
-    state = load_run(config, eyes.digest) if config.resume else None
+def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
+    """Return how to make a task's environments: those for training, and the held-out ones."""
+    task = task_by_name(config.task)
+    training, nominal = task.training_config(config.randomise), task.training_config(False)
+    return lambda n: make_vec(task.name, n, training), lambda n: make_vec(task.name, n, nominal)
+
+
+def _encoder(config: PolicyConfig) -> VisionEncoder | None:
+    """Load the vision encoder; None where the policy is to see no images."""
+    if config.encoder is None or (config.task in TASKS and task_by_name(config.task).mask_sampler is None):
+        return None
+    return VisionEncoder.load(config.encoder)
+
+
+def _train(
+    config: PolicyConfig, encoder: VisionEncoder | None, make_env: MakeEnv, make_held_out: MakeEnv, out: Path
+) -> dict[str, Any]:
+    state = load_run(config, encoder.digest if encoder else "") if config.resume else None
     torch.set_num_threads(config.threads)
-    env = _encoded(make_env(config.num_envs), eyes, config)
+    env = encoded(make_env(config.num_envs), encoder, config)
     try:
-        model, effort = _learn(config, env, eyes, state)
+        model, effort = _learn(config, env, encoder, state)
     finally:
         env.close()
-    layers, description = config.actor(model), _describe(config, eyes, effort)
-    folder = export_bundle(out / FOLDER, eyes.encoder, layers, env.scaling, description, force=True)
+    description = _describe(config, env, encoder, effort)
+    model_bytes = None if encoder is None else encoder.model
+    bundle = out / FOLDER
+
+    def export() -> None:
+        export_bundle(bundle, model_bytes, config.actor(model), env.scaling, description, force=True)
+
+    export()
     if config.evaluate_episodes:
-        description["results"] = _evaluate(folder, make_held_out, config)
-        export_bundle(folder, eyes.encoder, layers, env.scaling, description, force=True)
+        description["results"] = _evaluate(bundle, make_held_out, config)
+        export()
     return description["results"]
 
 
-@dataclass(frozen=True)
-class _Eyes:
-    """Eyes: bytes of encoder.onnx where there is one, what vae.json says, SHA-256 of both."""
-
-    encoder: bytes | None
-    vae: dict
-    digest: str
-
-    @classmethod
-    def load(cls, folder):
-        try:
-            text = read_bounded(folder, "vae.json", MAX_MANIFEST_BYTES)
-            vae = json.loads(text)
-            learned = vae["representation"] in LEARNED
-            encoder = read_bounded(folder, ENCODER, MAX_MODEL_BYTES) if learned else None
-            version = vae["format"]
-        except (BundleError, ValueError, KeyError, TypeError, RecursionError) as error:
-            remedy = f"run `contactsafe train vae --out {folder}` first"
-            if (folder / CHECKPOINT).exists():
-                remedy = "it is a run; give the folder in which `contactsafe train vae` has come to its end"
-            raise InvalidInputError(
-                f"{folder} holds no eyes (vae.json, and encoder.onnx where they are learned); {remedy}"
-            ) from error
-        if version != EYES_FORMAT:
-            raise InvalidInputError(
-                f"{folder / 'vae.json'} has format {shown(version)}, this version reads {EYES_FORMAT}; "
-                f"run `contactsafe train vae --out {folder}` anew"
-            )
-        if not _are_eyes(vae):
-            raise InvalidInputError(
-                f"{folder / 'vae.json'} holds numbers that cannot be; run `contactsafe train vae --out {folder}` anew"
-            )
-        return cls(encoder, vae, digest((encoder or b"") + text))
+def _homography(env: Any) -> Any:
+    return getattr(getattr(env, "unwrapped", env), "camera_homography", None)
 
 
-def _are_eyes(vae):
-    """Tell whether what vae.json says can be used as it is."""
-    statistics = vae.get("latent_mean"), vae.get("latent_std")
-    return (
-        vae["representation"] in REPRESENTATIONS
-        and all(isinstance(vae.get(name), int | float) for name in ("size", "window_m"))
-        and isinstance(vae["size"], int)
-        and all(low <= vae[name] <= high for name, (low, high) in (("size", (8, 1024)), ("window_m", (0.01, 10.0))))
-        and all(isinstance(numbers, list) and 1 <= len(numbers) <= MAX_LATENT for numbers in statistics)
-        and len(statistics[0]) == len(statistics[1])
-        and all(isinstance(number, int | float) and abs(number) < 1e6 for number in statistics[0] + statistics[1])
-    )
+def encoded(raw_env: Any, encoder: VisionEncoder | None, config: PolicyConfig) -> EncodedVecEnv:
+    """Make of a task's vector environment what an algorithm learns in.
+
+    Args:
+        raw_env: the task's.
+        encoder: of its masks; None where the policy is to see none.
+        config: the settings.
+    """
+    vectors = chosen(getattr(raw_env, "unwrapped", raw_env).observation_vectors, config.observes)
+    dither = Dither(config.dither, rate_hz=config.rate_hz)
+    perception, statistics = None, ((), ())
+    if encoder is not None:
+        perception = encoder.perception(_homography(raw_env), config.encoder_threads)
+        statistics = encoder.description["latent_mean"], encoder.description["latent_std"]
+    scaling = ObservationScaling.from_statistics(vectors, *statistics)
+    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, dither)
 
 
-def _encoded(raw_env, eyes, config):
-    vae = eyes.vae
-    session = None
-    if eyes.encoder is not None:
-        name = str(config.vae / ENCODER)
-        graph = read_graph(eyes.encoder, name)
-        check_ports(graph, name, *encoder_ports(vae["size"], len(vae["latent_mean"])))
-        session = open_session(graph, name, config.encoder_threads)
-    view = (vae["representation"], vae["window_m"], vae["size"])
-    perception = Perception(session, *view, _homography(raw_env), share=True)
-    scaling = ObservationScaling.from_statistics(config.observes, vae["latent_mean"], vae["latent_std"])
-    scan = Scan(config.scan, rate_hz=config.rate_hz)
-    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, scan)
-
-
-def _homography(env):
-    return getattr(env, "unwrapped", env).camera_homography
-
-
-def _learn(config, env, eyes, state):
-    """Give the trained model, and how many steps and minutes it took over all sessions."""
+def _learn(
+    config: PolicyConfig, env: EncodedVecEnv, encoder: VisionEncoder | None, state: dict[str, Any] | None
+) -> tuple[BaseAlgorithm, dict[str, Any]]:
+    """Return the trained model, and how many steps and minutes it took over all sessions."""
     model = config.make_model(env)
-    run = Run(config, model, env, eyes.digest)
-    recorder = Recorder(run, 0.0 if state is None else run.restore(state))
+    run = Run(config, model, env, encoder.digest if encoder else "")
+    recorder = Recorder(run, 0.0 if state is None else run.load_state_dict(state))
     write_json(config.out / "config.json", plain(config))
     # Stable-Baselines3 adds these to the steps done: its total, which the learning rate falls by, stays total_steps.
     remaining = config.total_steps - model.num_timesteps
@@ -161,39 +136,49 @@ def _learn(config, env, eyes, state):
     return model, {"steps": run.saved_steps, "minutes": round(recorder.minutes(), 1)}
 
 
-def _describe(config, eyes, effort):
+def _describe(
+    config: PolicyConfig, env: EncodedVecEnv, encoder: VisionEncoder | None, effort: dict[str, Any]
+) -> dict[str, Any]:
+    """Return what the bundle says of a policy beside its models."""
+    spaces: Any = env.env.single_observation_space
+    training: dict[str, Any] = {config.algorithm: _portable(plain(config))}
+    image: dict[str, Any] = {"representation": NO_IMAGE, "latent_size": 0}
+    if encoder is not None:
+        said = encoder.description
+        image = {
+            "representation": said["representation"],
+            "window_m": said["window_m"],
+            "view_size": said["size"],
+            "latent_size": encoder.latent_size,
+        }
+        training["encoder"] = {
+            key: _portable(value) if key == "config" else value
+            for key, value in said.items()
+            if not key.startswith("latent_")
+        }
     return {
-        "representation": eyes.vae["representation"],
-        "window_m": eyes.vae["window_m"],
-        "view_size": eyes.vae["size"],
-        "latent_size": len(eyes.vae["latent_mean"]),
-        "observes": list(config.observes),
+        "task": config.task,
+        **image,
+        "observes": [{"name": name, "size": spaces[name].shape[0]} for name in env.scaling.observes],
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
-        "scan": asdict(Scan(config.scan, rate_hz=config.rate_hz)),
-        "training": {
-            config.algorithm: _portable(plain(config)),
-            "vae": {
-                key: _portable(value) if key == "config" else value
-                for key, value in eyes.vae.items()
-                if not key.startswith("latent_")
-            },
-            **effort,
-        },
+        "dither": asdict(env.dither),
+        "training": {**training, **effort},
         "results": {},
     }
 
 
-def _portable(settings):
+def _portable(settings: dict[str, Any]) -> dict[str, Any]:
     """Leave out what names folders of this machine, or this session only."""
-    return {key: value for key, value in settings.items() if key not in ("vae", "out", "resume")}
+    folders = ("out", "resume", *(name for name in ("encoder",) if isinstance(settings.get(name), str)))
+    return {key: value for key, value in settings.items() if key not in folders}
 
 
-def _evaluate(folder, make_env, config):
+def _evaluate(folder: Path, make_env: MakeEnv, config: PolicyConfig) -> dict[str, Any]:
     env = make_env(min(config.num_envs, config.evaluate_episodes))
     try:
         policy = Policy(folder, _homography(env))
-        with tqdm(total=config.evaluate_episodes, desc="held-out boards", unit="episode") as bar:
+        with tqdm(total=config.evaluate_episodes, desc="held-out episodes", unit="episode") as bar:
             seed = config.seed + HELD_OUT_SEED
             results = evaluate_policy(
                 policy, env, config.evaluate_episodes, seed, config.rate_hz, lambda _: bar.update()

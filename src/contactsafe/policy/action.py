@@ -11,16 +11,10 @@ DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 
 _UNDO_DOWN = np.array([0.0, -1.0, 0.0, 0.0])
 
-ACTION_NAMES = tuple(
-    [f"x_d {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
-    + [f"K1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
-    + [f"D1 {axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
-)
-
 
 @compiled
 def rotation_from_down(quat):
-    """Give the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
+    """Return the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
     return quat_to_rotvec(quat_multiply(quat, _UNDO_DOWN))
 
 
@@ -28,8 +22,8 @@ def rotation_from_down(quat):
 def apply_action(c, limits, rule, action):
     """Move the target of a `controller_dtype` record by one action.
 
-    x_d never leads the tool by more than `lead` along the board, nor leaves its bounds; the posture is the one that
-    goes with x_d, whatever way led there, and stays where it was when there is none.
+    x_d is never farther from the tool than `offset_max` along x and y, nor outside its bounds; the posture is the one
+    that goes with x_d, whatever path led there, and stays where it was when there is none.
 
     Args:
         c: the controller; its `output.position` is where the tool was measured last.
@@ -51,7 +45,7 @@ def apply_action(c, limits, rule, action):
         target.D_task[i] = min(max(D, limits.D_low[i]), limits.D_high[i])
     for i in range(2):
         tool = c.output.position[i]
-        target.position[i] = min(max(target.position[i], tool - limits.lead[0]), tool + limits.lead[0])
+        target.position[i] = min(max(target.position[i], tool - limits.offset_max[0]), tool + limits.offset_max[0])
     target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
     q_posture = np.empty(target.q_posture.shape[0])
     error, rotation_error = find_posture(rule, target.position, target.quat, q_posture)

@@ -5,6 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+ACTIONS = tuple(
+    f"{group}_{axis}"
+    for group in ("x_d", "K_task", "D_task")
+    for axis in ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+)
+"""What each number of an action increments, in order; each in [-1, 1]."""
+
+ACTION_SIZE = len(ACTIONS)
+
 Six = tuple[float, float, float, float, float, float]
 
 
@@ -13,15 +22,15 @@ class ActionConfig:
     """How an action in [−1, 1]¹⁸ moves the target, each policy step of 1/60 s.
 
     Attributes:
-        translation: largest step of x_d along x, y, z, m (0.4 m/s along the board, 0.12 m/s towards it).
+        translation: largest step of x_d along x, y, z, m (0.4 m/s along x and y, 0.12 m/s along z).
         rotation: largest step of x_d about x, y, z, rad.
         stiffness: largest step of K1, 1/s²; at K = 100 that is 600 1/s³, within the passive rate of Kronander &
             Billard 2016 (775 1/s³).
         damping: largest step of D1, 1/s.
-        lead: largest distance of x_d from the tool along the board, m.
-        press: deepest x_d below the board, m.
-        height: highest x_d above the board, m.
-        reach: half edge of the square around the board's centre that x_d stays in, m.
+        offset_max: largest distance of x_d from the tool along x and y, m.
+        press: lowest x_d below the centre of the workspace, m.
+        height: highest x_d above it, m.
+        reach: half edge of the square around it that x_d stays in, m.
         tilt: largest rotation of x_d from straight down, rad, each axis.
         stiffness_low, stiffness_high: range of K1, 1/s².
         damping_low, damping_high: range of D1, 1/s.
@@ -32,7 +41,7 @@ class ActionConfig:
     rotation: tuple[float, float, float] = (0.01, 0.01, 0.02)
     stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
     damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
-    lead: float = 0.05
+    offset_max: float = 0.05
     press: float = 0.012
     height: float = 0.12
     reach: float = 0.27
@@ -51,7 +60,7 @@ class ActionLimits(NamedTuple):
         step: largest change of pose, K1, D1, (18,).
         low, high: bounds of x_d along x, y, z, m, and of the rotation vector from straight down, rad, (6,).
         K_low, K_high, D_low, D_high: (6,).
-        lead: (1,), m.
+        offset_max: (1,), m.
     """
 
     step: np.ndarray
@@ -61,7 +70,7 @@ class ActionLimits(NamedTuple):
     K_high: np.ndarray
     D_low: np.ndarray
     D_high: np.ndarray
-    lead: np.ndarray
+    offset_max: np.ndarray
 
 
 def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> ActionLimits:
@@ -76,5 +85,5 @@ def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> A
         K_high=np.array(config.stiffness_high),
         D_low=np.array(config.damping_low),
         D_high=np.array(config.damping_high),
-        lead=np.array([config.lead]),
+        offset_max=np.array([config.offset_max]),
     )

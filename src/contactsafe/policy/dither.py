@@ -1,9 +1,9 @@
-"""A small steady motion over the board, laid over what a policy asks for, as a hand makes when it wipes.
+"""Dither: a small steady motion added to what a policy asks for, as a hand makes while it works a surface.
 
-The mean of a policy that has learned with noise can stand still between two patches of ink, where each draws as much as
-the other, or before one that the hand hides and uncovers. Noise had always carried it on; without, it stays for ever. A
-motion that never rests does the same, and the same again for the same episode. Its two periods have the golden ratio,
-so that it does not repeat itself.
+The mean of a policy that has learned with noise can stand still between two goals that attract it equally, or before
+one that the arm hides from the camera. Exploration noise had always carried it on; without, it stays there. A motion
+that never rests does the same, and the same again for the same episode. Its two periods have the golden ratio, so that
+it does not repeat itself.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 
 
 @dataclass(frozen=True)
-class Scan:
+class Dither:
     """The motion.
 
     Attributes:
-        amplitude: along x and along y, as a share of the largest action; 0 for none.
+        amplitude: along x and along y, as a fraction of the largest action; 0 for none.
         period_s: along x, s.
         rate_hz: of actions.
     """
@@ -29,16 +29,16 @@ class Scan:
     period_s: float = 2.0
     rate_hz: float = 60.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a motion that is none."""
         if not (0.0 <= self.amplitude <= 1.0 and 0.1 <= self.period_s <= 60.0 and 0.1 <= self.rate_hz <= 1000.0):
             raise InvalidInputError(
-                f"scan amplitude = {self.amplitude}, period_s = {self.period_s}, rate_hz = {self.rate_hz}; "
+                f"dither amplitude = {self.amplitude}, period_s = {self.period_s}, rate_hz = {self.rate_hz}; "
                 "give 0 ≤ amplitude ≤ 1, 0.1 ≤ period_s ≤ 60 and 0.1 ≤ rate_hz ≤ 1000"
             )
 
-    def over(self, actions, steps):
-        """Lay the motion over actions.
+    def over(self, actions: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Add the motion to actions.
 
         Args:
             actions: (N, 18).

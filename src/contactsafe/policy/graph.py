@@ -55,6 +55,10 @@ _SCHEMA = {
 """The part of ONNX's format that is read: fields with number and type, * for lists; the rest is refused."""
 
 
+Ports = dict[str, tuple[str, list[int]]]
+"""Inputs or outputs by name: kind of number, such as "float", and shape without the batch."""
+
+
 class Graph(NamedTuple):
     """A checked model.
 
@@ -97,13 +101,13 @@ def read_graph(data: bytes, name: str) -> Graph:
         raise BundleError(f"{name} has names that are no text; export it anew") from None
 
 
-def check_ports(graph: Graph, name: str, inputs: dict, outputs: dict) -> None:
+def check_ports(graph: Graph, name: str, inputs: Ports, outputs: Ports) -> None:
     """Refuse a model with other inputs and outputs than wanted.
 
     Args:
         graph: the model.
         name: what to call it in errors.
-        inputs, outputs: by name the kind of number, such as "float", and the shape without the batch, a list.
+        inputs, outputs: wanted.
 
     Raises:
         BundleError: one is absent, of another type or shape, of a fixed batch, or there is another.

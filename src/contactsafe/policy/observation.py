@@ -1,35 +1,84 @@
-"""What a policy's network sees: the vectors it observes and the latent, one after the other, each at its scale."""
+"""What a policy's network observes: the vectors that a task declares and a latent, each at its scale, as one vector."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-ACTION_SIZE = 18
-"""Numbers of an action: increments of x_d, K1 and D1, six each."""
-
-OBSERVED = {"pose": 6, "target": 18, "force": 3}
-"""What a policy may observe besides the mask, and how many numbers each; `WipingEnv` says what they are."""
-
-SCALES = {
-    # Middle of the board and half the ink area, a hand's breadth of height, m; rad.
-    "pose": ((0.5, 0.0, 0.01, 0.0, 0.0, 0.0), (0.15, 0.15, 0.03, 0.1, 0.1, 0.1)),
-    # How far x_d leads, m and rad; then K1, 1/s², and D1, 1/s, by the middle and half the range of what actions reach.
-    "target": (
-        (*6 * [0.0], *3 * [150.0], *3 * [450.0], *3 * [25.0], *3 * [42.0]),
-        (0.03, 0.03, 0.01, 0.03, 0.03, 0.03, *3 * [60.0], *3 * [150.0], *3 * [8.0], *3 * [10.0]),
-    ),
-    # What gentle wiping presses with, N.
-    "force": ((0.0, 0.0, 0.0), (5.0, 5.0, 5.0)),
-}
-"""Centre and scale of the vectors that the task offers."""
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.action_config import ActionConfig
 
 MIN_STD = 0.2
-"""A latent number that hardly moves is not blown up to unit variance: it would be noise."""
+"""Least standard deviation by which a latent number is scaled: one that hardly moves would become noise."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A vector that a task lets its policies observe; an environment lists its own as `observation_vectors`.
+
+    Attributes:
+        name: key in the environment's observation.
+        centre: what counts as zero, one number for each of the vector's.
+        scale: what counts as one, likewise.
+        unit: of the numbers.
+        doc: what they are.
+    """
+
+    name: str
+    centre: tuple[float, ...]
+    scale: tuple[float, ...]
+    unit: str = ""
+    doc: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a centre and a scale of different lengths, and a scale that is not positive."""
+        if not self.centre or len(self.centre) != len(self.scale) or not all(scale > 0.0 for scale in self.scale):
+            raise InvalidInputError(
+                f"observation '{self.name}' has {len(self.centre)} centres and scales {self.scale}; give as many "
+                "positive scales as centres, one or more"
+            )
+
+    @property
+    def size(self) -> int:
+        """Numbers in the vector."""
+        return len(self.centre)
+
+
+def target_observation(config: ActionConfig) -> Observation:
+    """Return how policies observe the target: offset of x_d from the tool, K1 and D1, scaled by what actions reach."""
+    low, high = (
+        np.array([*stiffness, *damping])
+        for stiffness, damping in (
+            (config.stiffness_low, config.damping_low),
+            (config.stiffness_high, config.damping_high),
+        )
+    )
+    return Observation(
+        "target",
+        centre=(*6 * [0.0], *((low + high) / 2.0).tolist()),
+        scale=(0.03, 0.03, 0.01, 0.03, 0.03, 0.03, *((high - low) / 2.0).tolist()),
+        unit="m, rad, 1/s², 1/s",
+        doc="x_d less the pose, then K1 and D1",
+    )
+
+
+def chosen(vectors: Sequence[Observation], names: Iterable[str]) -> tuple[Observation, ...]:
+    """Return the vectors of these names, in the order of the names; all of them where there are no names.
+
+    Raises:
+        InvalidInputError: a name is unknown, or stands twice.
+    """
+    names = tuple(names) or tuple(vector.name for vector in vectors)
+    known = {vector.name: vector for vector in vectors}
+    if len(set(names)) < len(names) or not set(names) <= set(known):
+        raise InvalidInputError(f"observes = {names}; give some of {', '.join(known)}, each once")
+    return tuple(known[name] for name in names)
 
 
 @dataclass(frozen=True)
 class ObservationScaling:
-    """Fixed scaling of [vectors, latent]; nothing that runs along, so nothing to be forgotten beside a policy.
+    """Fixed scaling of [vectors, latent]; no running statistics that would have to be shipped beside a policy.
 
     Attributes:
         observes: names of the vectors, in order.
@@ -44,18 +93,26 @@ class ObservationScaling:
     clip: float = 8.0
 
     @classmethod
-    def from_statistics(cls, observes, latent_mean, latent_std, clip=8.0):
+    def from_statistics(
+        cls,
+        vectors: Sequence[Observation],
+        latent_mean: Sequence[float] | np.ndarray = (),
+        latent_std: Sequence[float] | np.ndarray = (),
+        clip: float = 8.0,
+    ) -> "ObservationScaling":
         """Join the vectors' stated scaling with the latent's measured one."""
-        centre = [*(c for name in observes for c in SCALES[name][0]), *latent_mean]
-        scale = [*(s for name in observes for s in SCALES[name][1]), *np.maximum(latent_std, MIN_STD)]
-        return cls(tuple(observes), tuple(float(c) for c in centre), tuple(float(s) for s in scale), clip)
+        centre = [*(c for vector in vectors for c in vector.centre), *latent_mean]
+        std = np.maximum(np.asarray(latent_std, dtype=np.float64), MIN_STD)
+        scale = [*(s for vector in vectors for s in vector.scale), *std]
+        names = tuple(vector.name for vector in vectors)
+        return cls(names, tuple(float(c) for c in centre), tuple(float(s) for s in scale), clip)
 
-    def __call__(self, observation, latent):
+    def __call__(self, observation: Mapping[str, Any], latent: np.ndarray) -> np.ndarray:
         """Scale what N environments observe, (N, j) each, and their latents (N, l): (N, k) float32."""
         raw = np.concatenate([*(np.asarray(observation[name], np.float32) for name in self.observes), latent], axis=1)
         centre, scale = np.asarray(self.centre, np.float32), np.asarray(self.scale, np.float32)
         return np.clip((raw - centre) / scale, -self.clip, self.clip).astype(np.float32)
 
-    def as_dict(self):
-        """Give centre, scale and clip as plain values."""
+    def as_dict(self) -> dict[str, Any]:
+        """Return centre, scale and clip as plain values."""
         return {"centre": list(self.centre), "scale": list(self.scale), "clip": self.clip}

@@ -5,34 +5,39 @@ import onnxruntime
 
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import BundleError, InvalidInputError
-from contactsafe.policy.graph import Graph, read_graph
-from contactsafe.vision.log_polar import FEATURES, SHARES, foveate, ground_of
+from contactsafe.policy.graph import Graph, Ports, read_graph
+from contactsafe.vision.log_polar import CHUNKS, FEATURES, ground_of, log_polar_features
 from contactsafe.vision.rectify import rectify
 
 LEARNED = ("tool", "paper")
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
 
-EYES_FORMAT = 3
-"""Version of what vae.json holds and of what its numbers mean."""
+NO_IMAGE = "none"
+"""Representation of a policy that sees no images: its latent has no numbers."""
 
-REPRESENTATIONS = ("foveated", *LEARNED)
+ENCODER_FORMAT = 4
+"""Version of what encoder.json holds and of what its numbers mean."""
+
+WITH_IMAGE = ("log_polar", *LEARNED)
+
+REPRESENTATIONS = (*WITH_IMAGE, NO_IMAGE)
 
 
 class _Session(onnxruntime.InferenceSession):
     """A session that copies and pickles as the bytes it was started on; copies check and start them again."""
 
-    def __init__(self, model, name, options):
+    def __init__(self, model: bytes, name: str, options: onnxruntime.SessionOptions):
         super().__init__(model, options, providers=["CPUExecutionProvider"])
         self._opened = model, name, options.intra_op_num_threads
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple:
         return open_session, self._opened
 
-    def __copy__(self):
+    def __copy__(self) -> "onnxruntime.InferenceSession":
         return open_session(*self._opened)
 
 
-def open_session(model, name, threads=1):
+def open_session(model: bytes | Graph, name: str, threads: int = 1) -> onnxruntime.InferenceSession:
     """Start ONNX Runtime on a model held in memory, once it has been checked.
 
     Args:
@@ -58,8 +63,8 @@ def open_session(model, name, threads=1):
         raise BundleError(f"{name} is not a model ONNX Runtime takes ({reason}); export the bundle anew") from error
 
 
-def encoder_ports(size, latent_size):
-    """Give inputs and outputs of an encoder of pictures of so many pixels along a side, as `graph.check_ports` does."""
+def encoder_ports(size: int, latent_size: int) -> tuple[Ports, Ports]:
+    """Return inputs and outputs of an encoder of images of so many pixels along a side."""
     return {"mask": ("uint8", [size, size])}, {"latent": ("float", [latent_size])}
 
 
@@ -67,36 +72,45 @@ class Perception(Independent):
     """Masks and tool positions in, latents out.
 
     Args:
-        session: ONNX Runtime session of the encoder; None for "foveated", which has none.
-        representation: "foveated" says where ink is, seen from the tool (`vision.log_polar`); "tool" shows the encoder
-            the mask in the tool's frame, "paper" as the camera sees it.
+        session: ONNX Runtime session of the encoder; None for "log_polar", which has none.
+        representation: "log_polar" has features of the mask about the tool (`vision.log_polar`); "tool" shows the
+            encoder the mask in the tool's frame, "paper" as the camera sees it.
         window_m: side of the tool's window, m; read for "tool".
         size: pixels along a side of what the encoder takes, or of the camera's mask.
-        homography: board plane to camera pixels, (3, 3); not read for "paper".
-        share: whether threads of its own share a batch of foveated pictures; not for a control loop. `close` ends them.
+        homography: working plane to camera pixels, (3, 3); not read for "paper".
+        threaded: whether threads of its own divide a batch of log-polar features; not for a control loop. `close` ends
+            them.
 
     Attributes:
         latent_size: how many numbers come out.
     """
 
-    def __init__(self, session, representation, window_m, size, homography, share=False):
-        if representation not in REPRESENTATIONS:
-            allowed = ", ".join(REPRESENTATIONS)
+    def __init__(
+        self,
+        session: onnxruntime.InferenceSession | None,
+        representation: str,
+        window_m: float,
+        size: int,
+        homography: np.ndarray | None,
+        threaded: bool = False,
+    ):
+        if representation not in WITH_IMAGE:
+            allowed = ", ".join(WITH_IMAGE)
             raise InvalidInputError(f"representation is {representation!r}; choose one of {allowed}")
         self.session = session
         self.representation = representation
         self.window_m = window_m
         self.size = size
         self.homography = np.array(homography, dtype=np.float64) if representation != "paper" else None
-        self.ground = ground_of(self.homography, (size, size)) if representation == "foveated" else None
-        self._threads = Threads(SHARES) if share and self.ground is not None else None
+        self.ground = ground_of(self.homography, (size, size)) if representation == "log_polar" else None
+        self._threads = Threads(CHUNKS) if threaded and self.ground is not None else None
         self.latent_size = FEATURES if session is None else session.get_outputs()[0].shape[1]
 
-    def __call__(self, masks, tool_positions):
+    def __call__(self, masks: np.ndarray, tool_positions: np.ndarray) -> np.ndarray:
         """Encode a batch.
 
         Args:
-            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, ink 0.
+            masks: camera masks, (N, height, width, 1) or (N, height, width), uint8, foreground 0.
             tool_positions: (N, 2) or wider, m, world; x and y are read.
 
         Returns:
@@ -106,7 +120,7 @@ class Perception(Independent):
             InvalidInputError: a shape or type differs.
         """
         if self.ground is not None:
-            return foveate(masks, tool_positions, self.ground, self._threads)
+            return log_polar_features(masks, tool_positions, self.ground, self._threads)
         if self.representation == "tool":
             views = rectify(masks, tool_positions, self.homography, self.window_m, self.size)
         else:
@@ -117,9 +131,14 @@ class Perception(Independent):
                     f"masks are {views.dtype} of shape {views.shape}; "
                     f"this encoder takes uint8 (N, {self.size}, {self.size})"
                 )
+        return self._encode(views)
+
+    def _encode(self, views: np.ndarray) -> np.ndarray:
+        if self.session is None:
+            raise InvalidInputError(f"representation '{self.representation}' needs an encoder, and session is None")
         return self.session.run(["latent"], {"mask": views})[0]
 
-    def close(self):
+    def close(self) -> None:
         """End the threads."""
         if self._threads is not None:
             self._threads.close()

@@ -13,6 +13,7 @@ from contactsafe.control.records import controller_dtype, fill_params, index_bou
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.state import Entry, load_state_dict, of_generators, of_records, state_dict
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim import mujoco_backend
@@ -22,7 +23,7 @@ from contactsafe.sim.mujoco_record import fill_plant, point_plant
 from contactsafe.sim.record import world_bounds, world_dtype
 from contactsafe.sim.scene import build_plant
 from contactsafe.sim.sensing import fill_errors, noise_channels
-from contactsafe.sim.snapshot import Part, of_generators, of_physics, of_records, put, take
+from contactsafe.sim.state import of_physics
 from contactsafe.sim.stepping import run_ticks
 from contactsafe.sim.truth import sample_dtype, step_metrics_dtype, trace_dtype
 
@@ -145,12 +146,12 @@ class Worlds(Independent):
             point_plant(record["plant"], model, data)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "physics": of_physics(self.models, self.datas).take()}
+        return {**super().__getstate__(), "physics": of_physics(self.models, self.datas).read()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         physics = state.pop("physics")
         super().__setstate__(state)
-        of_physics(self.models, self.datas).put(physics)
+        of_physics(self.models, self.datas).write(physics)
 
     def use(self, controller: ControllerConfig) -> None:
         """Put another controller in charge of every world, which costs far less than worlds of its own.
@@ -200,7 +201,7 @@ class Worlds(Independent):
         self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
         mujoco.mj_kinematics(self.models[i], self.datas[i])
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the worlds' future, in the order in which it must be put back."""
         changing = world_bounds(min(model.nbody for model in self.models))
         return {
@@ -211,17 +212,17 @@ class Worlds(Independent):
             "noise": of_generators(self.rngs),
         }
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the worlds' future, as plain values and arrays; see `contactsafe.sim.snapshot`."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the worlds' future, as plain values and arrays; see `contactsafe.core.state`."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the worlds where a snapshot of worlds made alike was taken: they go on as those did, to the bit.
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load the state of worlds made alike: they go on as those did, to the bit.
 
         Raises:
             InvalidInputError: it is of other worlds, or of another version.
         """
-        put(self.parts(), snapshot)
+        load_state_dict(self.state_entries(), state)
 
     def close(self) -> None:
         """Stop the threads, and end the backends."""

@@ -31,9 +31,9 @@ NEAR_M = 0.02
 """Distance below which the direction to ink fades."""
 
 FEATURES = RINGS * SECTORS + 4 * len(SCALES_M) + 1
-"""Numbers in a foveated picture."""
+"""Numbers in the log-polar features."""
 
-SHARES = 2
+CHUNKS = 2
 """Into which a batch is split for threads."""
 
 
@@ -81,13 +81,13 @@ def ground_of(homography, size):
     return Ground(place.reshape(-1, 2), np.ascontiguousarray(area.reshape(-1)))
 
 
-def foveate(masks, tool_positions, ground, threads=None):
+def log_polar_features(masks, tool_positions, ground, threads=None):
     """Say where ink is as seen from each tool.
 
     Features, in this order: log-amount of ink in each of RINGS × SECTORS cells about the tool, rings evenly spaced in
-    the logarithm of distance, sectors from world x towards y, each pixel shared between the cells about it; for each
+    the logarithm of distance, sectors from world x towards y, each pixel spread over the cells about it; for each
     of SCALES_M the middle of the patch about the nearest ink: direction (2), fading below NEAR_M, its distance / 0.1 m,
-    and the log-amount of ink that goes into it; log-amount of all ink in sight. All are 0 where no ink is in sight.
+    and the log-amount of ink that goes into it; log-amount of all ink in view. All are 0 where no ink is in view.
 
     A patch is about one place, so that of two patches as far away on either side the finer scales say the one or the
     other. Their mean would lie under the tool, and a policy that believed it would stay there.
@@ -96,7 +96,7 @@ def foveate(masks, tool_positions, ground, threads=None):
         masks: camera masks, (N, height, width) or (N, height, width, 1), uint8: 0 is ink, 255 all else.
         tool_positions: tool points in world, (N, 2) or wider, m; only x and y are read.
         ground: `Ground` of the camera.
-        threads: `Threads` that share the work; None to do it here.
+        threads: `Threads` that divide the work; None to do it here.
 
     Returns:
         (N, FEATURES) float32.
@@ -118,27 +118,27 @@ def foveate(masks, tool_positions, ground, threads=None):
     flat = np.ascontiguousarray(masks).reshape(len(masks), -1)
     tool_xy = np.ascontiguousarray(tool_xy[:, :2])
     if threads is None:
-        _foveate_some(0, len(masks), flat, tool_xy, ground.place, ground.area, features)
+        _fill_features(0, len(masks), flat, tool_xy, ground.place, ground.area, features)
         return features
-    bounds = np.linspace(0, len(masks), min(len(masks), SHARES) + 1).astype(int).tolist()
-    shares = [
-        threads.submit(_foveate_some, start, stop, flat, tool_xy, ground.place, ground.area, features)
+    bounds = np.linspace(0, len(masks), min(len(masks), CHUNKS) + 1).astype(int).tolist()
+    chunks = [
+        threads.submit(_fill_features, start, stop, flat, tool_xy, ground.place, ground.area, features)
         for start, stop in itertools.pairwise(bounds)
     ]
-    for share in shares:
-        share.result()
+    for chunk in chunks:
+        chunk.result()
     return features
 
 
 @compiled(nogil=True)
-def _foveate_some(start, stop, masks, tool_xy, place, area, features):
+def _fill_features(start, stop, masks, tool_xy, place, area, features):
     for n in range(start, stop):
         if math.isfinite(tool_xy[n, 0]) and math.isfinite(tool_xy[n, 1]):
-            _foveate_one(masks[n], tool_xy[n, 0], tool_xy[n, 1], place, area, features[n])
+            _fill_features_of(masks[n], tool_xy[n, 0], tool_xy[n, 1], place, area, features[n])
 
 
 @compiled(nogil=True)
-def _foveate_one(mask, tool_x, tool_y, place, area, out):
+def _fill_features_of(mask, tool_x, tool_y, place, area, out):
     dark = np.empty(mask.shape[0], dtype=np.int32)
     pixels = dark[: places_unlike(mask, np.uint8(255), dark)]
     count, near = 0, 0
@@ -157,7 +157,7 @@ def _foveate_one(mask, tool_x, tool_y, place, area, out):
         dx, dy = place[p, 0] - tool_x, place[p, 1] - tool_y
         distance = math.sqrt(dx * dx + dy * dy)
         total += area[p]
-        _share_out(dx, dy, distance, area[p], grid)
+        _spread(dx, dy, distance, area[p], grid)
         away = math.sqrt((place[p, 0] - place[near, 0]) ** 2 + (place[p, 1] - place[near, 1]) ** 2)
         for k in range(len(SCALES_M)):
             weight = area[p] * math.exp(-away / SCALES_M[k])
@@ -168,8 +168,8 @@ def _foveate_one(mask, tool_x, tool_y, place, area, out):
 
 
 @compiled(nogil=True)
-def _share_out(dx, dy, distance, amount, grid):
-    """Share an amount between the two rings and the two sectors about its place."""
+def _spread(dx, dy, distance, amount, grid):
+    """Spread an amount over the two rings and the two sectors about its place."""
     ring = math.log(max(distance, 1e-6) / RADIUS_M[0]) / math.log(RADIUS_M[1] / RADIUS_M[0]) * (RINGS - 1)
     ring = min(max(ring, 0.0), RINGS - 1.0)
     sector = (math.atan2(dy, dx) / (2.0 * math.pi) % 1.0) * SECTORS

@@ -58,7 +58,7 @@ def test_the_same_actions_move_the_tool_alike(both):
 
 def test_a_bundle_runs_unchanged():
     engine = make_engine("pybullet", 1, SHORT)
-    results = evaluate_policy(Policy(shipped_bundle(), engine.unwrapped.camera_homography), engine, 2, seed=0)
+    results = evaluate_policy(Policy(shipped_bundle("wiping"), engine.unwrapped.camera_homography), engine, 2, seed=0)
     assert results["episodes"] == 2
     assert [record["time_s"] for record in results["records"]] == [0.3, 0.3]
     engine.close()
@@ -80,7 +80,9 @@ def test_single_environment():
 @pytest.mark.slow
 def test_the_shipped_policy_wipes_in_the_second_engine():
     engine = make_engine("pybullet", 1, WipingConfig())
-    results = evaluate_policy(Policy(shipped_bundle(), engine.unwrapped.camera_homography), engine, 3, seed=1_000_003)
+    results = evaluate_policy(
+        Policy(shipped_bundle("wiping"), engine.unwrapped.camera_homography), engine, 3, seed=1_000_003
+    )
     engine.close()
     assert results["ink_removed_mean"] > 0.95
     assert results["peak_force_max_n"] < 40.0

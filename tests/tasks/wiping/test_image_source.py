@@ -15,7 +15,7 @@ from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 NAME = "contactsafe/Wiping-v0"
-PHOTOGRAPHED = WipingConfig(boards="handwriting", sight="photograph", episode_s=0.1)
+PHOTOGRAPHED = WipingConfig(boards="handwriting", image_source="photograph", episode_s=0.1)
 
 
 def agreement(a, b):
@@ -40,7 +40,7 @@ def test_a_drawing_of_ones_own_wins():
 
 
 def test_the_sight_changes_no_board_and_no_start():
-    plain, seen = (gymnasium.make(NAME, config=WipingConfig(sight=sight)) for sight in ("mask", "photograph"))
+    plain, seen = (gymnasium.make(NAME, config=WipingConfig(image_source=sight)) for sight in ("mask", "photograph"))
     (a, _), (b, _) = plain.reset(seed=5), seen.reset(seed=5)
     assert_array_equal(plain.unwrapped.tasks.worlds.cells, seen.unwrapped.tasks.worlds.cells)
     assert_array_equal(a["pose"], b["pose"])
@@ -64,11 +64,11 @@ def test_where_the_arm_hides_the_board_is_known_by_its_encoders():
     """Encoders that are off move the silhouette that is masked out, while the photograph stays what it was."""
     tasks = WipingTasks(PHOTOGRAPHED)
     tasks.reset(0, np.random.default_rng(1), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.05))
-    before, picture = tasks.worlds.masks[0].copy(), tasks._sight.photograph(0, tasks.tasks[0])
+    before, picture = tasks.worlds.masks[0].copy(), tasks._images.photograph(0, tasks.tasks[0])
     tasks.worlds.plants[0]["q_seen"][0] += 0.2
     tasks.observe(0)
     assert not np.array_equal(tasks.worlds.masks[0], before)
-    assert_array_equal(tasks._sight.photograph(0, tasks.tasks[0]), picture)
+    assert_array_equal(tasks._images.photograph(0, tasks.tasks[0]), picture)
 
 
 def test_many_environments_see_what_each_would_see_alone():
@@ -98,7 +98,7 @@ def test_light_and_noise_follow_from_the_tasks_record_alone():
     ("fields", "text"),
     [
         ({"boards": "crayon"}, "boards = 'crayon'; choose strokes, digits, text or handwriting"),
-        ({"sight": "x-ray"}, "sight = 'x-ray'; choose mask or photograph"),
+        ({"image_source": "x-ray"}, "sight = 'x-ray'; choose mask or photograph"),
     ],
 )
 def test_other_kinds_are_refused(fields, text):

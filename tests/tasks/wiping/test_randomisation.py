@@ -108,14 +108,14 @@ def test_a_knocked_camera_shifts_the_ink():
     assert 1.0 < np.linalg.norm(centres[0] - centres[1]) < 6.0
 
 
-def test_a_snapshot_knows_what_was_drawn():
+def test_a_state_knows_what_was_drawn():
     """Gone on with in another environment, whose episodes had drawn otherwise."""
     first, second = (gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=3, config=BROAD) for _ in range(2))
     first.reset(seed=1), second.reset(seed=2)
     actions = np.random.default_rng(0).uniform(-1, 1, (70, 3, 18))
     for action in actions[:20]:
         first.step(action)
-    second.unwrapped.restore(first.unwrapped.snapshot())
+    second.unwrapped.load_state_dict(first.unwrapped.state_dict())
     for action in actions[20:]:
         (one, *rest), (other, *others) = first.step(action), second.step(action)
         for name, value in one.items():

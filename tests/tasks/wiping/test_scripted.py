@@ -1,4 +1,4 @@
-"""The references: the raster needs no eyes and is gentle, chance wipes next to nothing. No torch."""
+"""Scripted policies: the raster needs no images and is gentle, random actions wipe next to nothing. No torch."""
 
 import gymnasium
 import numpy as np

@@ -14,12 +14,14 @@ from gymnasium.vector.utils import batch_space
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.core.state import Entry, load_state_dict, of_array, of_generators, of_object, state_dict
+from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.policy.observation import Observation
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.snapshot import Part, of_array, of_generators, of_object, put, take
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.config import TaskConfig
-from contactsafe.tasks.base.registry import backend_of, tasks_type
+from contactsafe.tasks.base.figures import EpisodeMetric, Figure
+from contactsafe.tasks.base.registry import backend_of, task_by_name
 from contactsafe.tasks.base.tasks import Tasks
 
 _RENDER_MODES = ["rgb_array"]
@@ -54,14 +56,13 @@ class _Environment(Independent):
                 f"max_episode_steps = {max_episode_steps}; give 1 or more, or None for the config's"
             )
         self.render_mode = render_mode
-        kind = tasks_type(task) if isinstance(task, str) else task
+        kind = task_by_name(task).simulation if isinstance(task, str) else task
         self.tasks = kind(config, num_envs, arm=arm, backend=backend_of(engine))
         if max_episode_steps is not None:
             self.tasks.step_limit = int(max_episode_steps)
-        record = self.tasks.tasks
         vectors = {
-            name: gymnasium.spaces.Box(-np.inf, np.inf, record[name].shape[1:], np.float32)
-            for name in self.tasks.observed
+            vector.name: gymnasium.spaces.Box(-np.inf, np.inf, (vector.size,), np.float32)
+            for vector in self.tasks.observation_vectors
         }
         observation = gymnasium.spaces.Dict({**vectors, **self.tasks.own_spaces()})
         return observation, gymnasium.spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
@@ -78,6 +79,21 @@ class _Environment(Independent):
             self._spec.max_episode_steps = self.tasks.step_limit
 
     @property
+    def observation_vectors(self) -> tuple[Observation, ...]:
+        """What policies may observe beside images."""
+        return self.tasks.observation_vectors
+
+    @property
+    def episode_metrics(self) -> tuple[EpisodeMetric, ...]:
+        """What an evaluation records of an episode."""
+        return self.tasks.episode_metrics
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """Of an evaluation."""
+        return self.tasks.figures
+
+    @property
     def camera_homography(self) -> np.ndarray | None:
         """Plane coordinates (x, y, 1), m, to pixels (u, v, w) of the task's camera, (3, 3); None without one."""
         return getattr(self.tasks, "camera_homography", None)
@@ -90,13 +106,13 @@ class _Environment(Independent):
 
     def _options(self, options: Mapping[str, Any] | None, *others: str) -> dict[str, Any]:
         """Return the options of a reset that the task takes; refuse what is not known."""
-        known = (*self.tasks.options, *others)
+        known = (*self.tasks.reset_options, *others)
         unknown = [str(name) for name in options or {} if name not in known]
         if unknown:
             raise InvalidInputError(
                 f"reset options hold {', '.join(unknown)}; known are {', '.join(known) or 'none'}; leave others out"
             )
-        return {name: value for name, value in (options or {}).items() if name in self.tasks.options}
+        return {name: value for name, value in (options or {}).items() if name in self.tasks.reset_options}
 
     def _picture(self, i: int) -> np.ndarray:
         picture = getattr(self.tasks, "picture", None)
@@ -317,7 +333,7 @@ class TaskVectorEnv(_Environment, gymnasium.vector.VectorEnv):
             "final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended.copy(),
         }  # fmt: skip
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the environment's future."""
         return {
             "tasks": of_object(self.tasks),
@@ -325,17 +341,17 @@ class TaskVectorEnv(_Environment, gymnasium.vector.VectorEnv):
             "ended": of_array(self._ended, 0, 1),
         }
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the environment's future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the environment's future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the environment where a snapshot of one made alike was taken: it goes on as that did, to the bit.
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load the state of an environment made alike: this one goes on as that did, to the bit.
 
         Raises:
             InvalidInputError: it is of another environment, or of another version.
         """
-        put(self.parts(), snapshot)
+        load_state_dict(self.state_entries(), state)
         self._was_reset = bool(self._rngs)
 
     def render(self) -> tuple[np.ndarray, ...] | None:

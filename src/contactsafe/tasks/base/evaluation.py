@@ -1,37 +1,32 @@
-"""How well a policy wipes: held-out boards, one episode each, no exploration. No torch."""
+"""How well a policy does a task: held-out episodes, no exploration. No torch."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
+from gymnasium.vector import VectorEnv
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.figures import FIGURES, EpisodeMetric, Episodes, Figure
 
 CONTACT_N = 0.5
-"""Tool force above which the pad counts as pressed, N: what it takes to erase."""
-
-
-FIGURES = {
-    "episodes": "boards wiped, one episode each",
-    "success": "fraction of boards wiped clean (99.8 % of the ink gone, unless told otherwise), which ends the episode",
-    "cleared_99": "fraction of boards with 99 % of their ink gone within the time limit",
-    "ink_removed_mean": "fraction of a board's ink that was wiped off: mean",
-    "ink_removed_median": "the same: median",
-    "ink_removed_p10": "the same: 10th percentile",
-    "time_mean_s": "length of an episode, s: mean; 20 s where nothing ended it before, such as a clean board",
-    "time_to_clean_median_s": "the same, of the boards wiped clean alone: median",
-    "peak_force_median_n": "largest force on the tool in an episode, N: median",
-    "peak_force_p95_n": "the same: 95th percentile",
-    "peak_force_max_n": "the same: largest of all",
-    "contact_force_median_n": "force on the tool, N, the largest of each policy step in contact: median",
-    "arm_table_contacts": "episodes ended because something other than the pad met board or table",
-    "contact_fraction": "fraction of all policy steps in which the tool was in contact; the rest goes from patch to patch",
-    "return_mean": "sum of an episode's rewards: mean",
-}
-"""What `evaluate_policy` returns, in its order, and what it means; forces are the simulator's."""
+"""Tool force above which the tool counts as in contact, N."""
 
 HELD_OUT_SEED = 1_000_003
-"""Added to the seeds of boards that are never trained on."""
+"""Added to the seeds of episodes that are never trained on."""
 
 
-def step_values(info, done, key):
+class Actor(Protocol):
+    """What is evaluated; where it keeps state of an episode it also has `begin(i)`."""
+
+    action_repeat: int
+
+    def act(self, observation: Mapping[str, Any]) -> np.ndarray:
+        """Choose the actions for a batch of observations."""
+        ...
+
+
+def step_values(info: Mapping[str, Any], done: np.ndarray, key: str) -> np.ndarray:
     """Read one number per environment from a vector environment's info, the last of an episode where it ended.
 
     With AutoresetMode.SAME_STEP the top level of info already belongs to the next episode where one ended; what the
@@ -53,7 +48,24 @@ def step_values(info, done, key):
     return values
 
 
-def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=None):
+def episode_metrics(env: Any) -> tuple[EpisodeMetric, ...]:
+    """Return the metrics that an environment declares, none where it declares none."""
+    return tuple(getattr(getattr(env, "unwrapped", env), "episode_metrics", ()))
+
+
+def figures_of(env: Any) -> tuple[Figure, ...]:
+    """Return the figures that an environment declares, those of every task where it declares none."""
+    return tuple(getattr(getattr(env, "unwrapped", env), "figures", FIGURES))
+
+
+def evaluate_policy(
+    policy: Actor,
+    vec_env: VectorEnv,
+    episodes: int,
+    seed: int,
+    rate_hz: float = 60.0,
+    on_episode: Callable[[dict], Any] | None = None,
+) -> dict[str, Any]:
     """Run a policy over seeded episodes.
 
     Each environment runs the same number of episodes, so short ones are not counted more often than long ones.
@@ -61,84 +73,86 @@ def evaluate_policy(policy, vec_env, episodes, seed, rate_hz=60.0, on_episode=No
     Args:
         policy: has `act(observation)` for a batch and `action_repeat`; where it keeps something in mind, `begin(i)`
             is called as an episode of environment i begins.
-        vec_env: a gymnasium VectorEnv with AutoresetMode.SAME_STEP; its info has ink_left, tool_force_n, is_success.
+        vec_env: with AutoresetMode.SAME_STEP; its info has tool_force_n, is_success and what its metrics read.
         episodes: to run in all; rounded up to a multiple of vec_env.num_envs.
         seed: of the first reset; use one that training did not.
         rate_hz: environment steps a second, for the times.
         on_episode: called with the record of each episode as it ends, for a progress bar.
 
     Returns:
-        A dict of `FIGURES`, NaN where nothing was wiped clean, and records: a dict per episode, by environment and then
-        by time.
+        A dict of the environment's figures, NaN where there is nothing to compute one from, and records: a dict per
+        episode, by environment and then by time.
 
     Raises:
         InvalidInputError: episodes is below 1.
     """
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
-    n = vec_env.num_envs
-    quota = -(-episodes // n)
-    observation, _ = vec_env.reset(seed=seed)
-    held = np.zeros((n, *vec_env.single_action_space.shape), np.float32)
-    steps, peak, returns = np.zeros(n, int), np.zeros(n), np.zeros(n)
-    records: list[list[dict]] = [[] for _ in range(n)]
-    contact_forces, all_steps = [], 0
-    begin = getattr(policy, "begin", lambda i: None)
-    for k in range(n):
-        begin(k)
-    while any(len(r) < quota for r in records):
-        fresh = steps % policy.action_repeat == 0
+    run = _Run(policy, vec_env, -(-episodes // vec_env.num_envs), rate_hz, on_episode)
+    run.reset(seed)
+    while run.active.any():
+        run.step()
+    done = Episodes([record for records in run.records for record in records], np.concatenate(run.forces), run.steps)
+    return {**{figure.name: figure.compute(done) for figure in figures_of(vec_env)}, "records": done.records}
+
+
+class _Run:
+    """An evaluation under way."""
+
+    def __init__(
+        self,
+        policy: Actor,
+        env: VectorEnv,
+        quota: int,
+        rate_hz: float,
+        on_episode: Callable[[dict], Any] | None,
+    ):
+        self.policy, self.env, self.quota, self.rate_hz = policy, env, quota, rate_hz
+        self.on_episode = on_episode or (lambda record: None)
+        self.begin = getattr(policy, "begin", lambda i: None)
+        n = env.num_envs
+        self.held = np.zeros((n, *(env.single_action_space.shape or ())), np.float32)
+        self.taken, self.peak, self.returns = np.zeros(n, int), np.zeros(n), np.zeros(n)
+        self.records: list[list[dict]] = [[] for _ in range(n)]
+        self.forces: list[np.ndarray] = []
+        self.steps = 0
+
+    @property
+    def active(self) -> np.ndarray:
+        """Which environments have episodes to run, (n,) bool."""
+        return np.array([len(records) < self.quota for records in self.records])
+
+    def reset(self, seed: int) -> None:
+        self.observation, _ = self.env.reset(seed=seed)
+        for k in range(self.env.num_envs):
+            self.begin(k)
+
+    def step(self) -> None:
+        fresh = self.taken % self.policy.action_repeat == 0
         if fresh.any():
-            held = np.where(fresh[:, None], policy.act(observation), held)
-        observation, reward, terminated, truncated, info = vec_env.step(held)
-        done = np.asarray(terminated) | np.asarray(truncated)
+            self.held = np.where(fresh[:, None], self.policy.act(self.observation), self.held)
+        self.observation, reward, terminated, truncated, info = self.env.step(self.held)
+        done, active = np.asarray(terminated) | np.asarray(truncated), self.active
         force = step_values(info, done, "tool_force_n")
-        ink_left, success = step_values(info, done, "ink_left"), step_values(info, done, "is_success")
-        touched = step_values(info, done, "arm_touched")
-        active = np.array([len(r) < quota for r in records])
-        all_steps += int(active.sum())
-        contact_forces.append(force[active & (force > CONTACT_N)])
-        steps, peak, returns = steps + 1, np.maximum(peak, force), returns + reward
-        for i in np.flatnonzero(done & active):
-            records[i].append(
-                {
-                    "success": bool(success[i]),
-                    "ink_removed": float(1.0 - ink_left[i]),
-                    "time_s": float(steps[i] / rate_hz),
-                    "peak_force_n": float(peak[i]),
-                    "arm_touched": bool(touched[i]),
-                    "return": float(returns[i]),
-                }
-            )
-            if on_episode is not None:
-                on_episode(records[i][-1])
-        steps[done], peak[done], returns[done] = 0, 0.0, 0.0
+        self.steps += int(active.sum())
+        self.forces.append(force[active & (force > CONTACT_N)])
+        self.taken, self.peak, self.returns = self.taken + 1, np.maximum(self.peak, force), self.returns + reward
+        if (done & active).any():
+            self._record(done, np.flatnonzero(done & active).tolist(), info)
+        self.taken[done], self.peak[done], self.returns[done] = 0, 0.0, 0.0
         for k in np.flatnonzero(done).tolist():
-            begin(k)
-    return _summary([record for env_records in records for record in env_records], contact_forces, all_steps)
+            self.begin(k)
 
-
-def _summary(records, contact_forces, all_steps):
-    forces = np.concatenate(contact_forces)
-    success = np.array([r["success"] for r in records])
-    removed, times, peaks, returns = (
-        np.array([r[key] for r in records]) for key in ("ink_removed", "time_s", "peak_force_n", "return")
-    )
-    return {
-        "episodes": len(records),
-        "success": float(success.mean()),
-        "cleared_99": float((removed >= 0.99).mean()),
-        "ink_removed_mean": float(removed.mean()),
-        "ink_removed_median": float(np.median(removed)),
-        "ink_removed_p10": float(np.quantile(removed, 0.1)),
-        "time_mean_s": float(times.mean()),
-        "time_to_clean_median_s": float(np.median(times[success])) if success.any() else float("nan"),
-        "peak_force_median_n": float(np.median(peaks)),
-        "peak_force_p95_n": float(np.quantile(peaks, 0.95)),
-        "peak_force_max_n": float(peaks.max()),
-        "contact_force_median_n": float(np.median(forces)) if len(forces) else 0.0,
-        "arm_table_contacts": int(sum(r["arm_touched"] for r in records)),
-        "contact_fraction": float(len(forces) / all_steps),
-        "return_mean": float(returns.mean()),
-        "records": records,
-    }
+    def _record(self, done: np.ndarray, ended: list[int], info: Mapping[str, Any]) -> None:
+        success = step_values(info, done, "is_success")
+        metrics = {metric: step_values(info, done, metric.key) for metric in episode_metrics(self.env)}
+        for i in ended:
+            record = {
+                "success": bool(success[i]),
+                **{metric.name: metric.convert(values[i]) for metric, values in metrics.items()},
+                "time_s": float(self.taken[i] / self.rate_hz),
+                "peak_force_n": float(self.peak[i]),
+                "return": float(self.returns[i]),
+            }
+            self.records[i].append(record)
+            self.on_episode(record)

@@ -2,15 +2,17 @@
 
 import importlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
+
+import gymnasium
 
 from contactsafe.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from contactsafe.tasks.base.tasks import Tasks
+    from contactsafe.tasks.base.task import Task
 
-_PLACES: dict[str, str] = {}
-"""Where each task's class is, `module:Class`."""
+TASKS: dict[str, str] = {}
+"""Place of every task, `module:NAME`, by its name."""
 
 ENGINES = ("mujoco", "pybullet")
 """What may compute the physics of a task."""
@@ -21,11 +23,9 @@ def register_task(name: str, place: str) -> None:
 
     Args:
         name: lower case, such as 'wiping'.
-        place: 'module:Class' of its subclass of `Tasks`.
+        place: 'module:NAME' of its `Task`, or of its subclass of `Tasks`, which is then a Task with all defaults.
     """
-    import gymnasium
-
-    _PLACES[name] = place
+    TASKS[name] = place
     if env_id(name) not in gymnasium.registry:
         at = "contactsafe.tasks.base.environment:Task"
         gymnasium.register(
@@ -33,26 +33,42 @@ def register_task(name: str, place: str) -> None:
         )
 
 
-def task_names() -> tuple[str, ...]:
-    """Return the names of the tasks that are known."""
-    return tuple(_PLACES)
-
-
 def env_id(name: str) -> str:
     """Return the Gymnasium id of a task."""
     return f"contactsafe/{name.capitalize()}-v0"
 
 
-def tasks_type(name: str) -> type["Tasks"]:
-    """Import a task's class.
+def task_by_name(name: str) -> "Task":
+    """Import a task.
 
     Raises:
         InvalidInputError: no task has this name.
     """
-    if name not in _PLACES:
-        raise InvalidInputError(f"task = {name!r} is unknown; choose one of {', '.join(_PLACES)}")
-    module, attribute = _PLACES[name].split(":")
-    return getattr(importlib.import_module(module), attribute)
+    from contactsafe.tasks.base.task import Task
+
+    if name not in TASKS:
+        raise InvalidInputError(f"task '{name}' is unknown; choose from {', '.join(TASKS)}")
+    module, attribute = TASKS[name].split(":")
+    found = getattr(importlib.import_module(module), attribute)
+    return found if isinstance(found, Task) else Task(found)
+
+
+def make_vec(name: str, num_envs: int, config: Any = None, engine: str = "mujoco", **others: Any) -> Any:
+    """Make a task's vector environment.
+
+    Args:
+        name: of the task.
+        num_envs: how many.
+        config: of the task; None for the defaults.
+        engine: one of `ENGINES`.
+        others: further arguments of `TaskVectorEnv`.
+
+    Raises:
+        InvalidInputError: no task has this name; there is no such engine, or it is not installed.
+    """
+    if name not in TASKS:
+        task_by_name(name)
+    return cast(Any, gymnasium.make_vec(env_id(name), num_envs=num_envs, config=config, engine=engine, **others))
 
 
 def backend_of(engine: str) -> Callable[..., Any] | None:

@@ -9,9 +9,10 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, of_records, state_dict
 from contactsafe.policy.action import act
-from contactsafe.policy.action_config import action_limits
-from contactsafe.policy.observation import ACTION_SIZE, OBSERVED
+from contactsafe.policy.action_config import ACTION_SIZE, action_limits
+from contactsafe.policy.observation import Observation
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.ik import InverseKinematics
@@ -19,10 +20,10 @@ from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
 from contactsafe.sim.backend import Backend
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.snapshot import Part, of_generators, of_object, of_records, put, take
 from contactsafe.sim.worlds import POLICY_RATE_HZ, Worlds, ticks_of_step
 from contactsafe.tasks.base.config import TaskConfig
-from contactsafe.tasks.base.pushes import Pusher
+from contactsafe.tasks.base.figures import FIGURES, EpisodeMetric, Figure
+from contactsafe.tasks.base.pushes import PushSchedule
 from contactsafe.tasks.base.record import observe_one, task_dtype
 
 
@@ -61,10 +62,13 @@ class Tasks(Independent):
     own_bounds: ClassVar[dict[str, tuple[float, float]]] = {}
     """What fields that index something may be, both ends included."""
 
-    observed: ClassVar[tuple[str, ...]] = tuple(OBSERVED)
-    """Fields of the records that policies observe."""
+    episode_metrics: ClassVar[tuple[EpisodeMetric, ...]] = ()
+    """Numbers of an episode, recorded and logged beside success, time and force."""
 
-    options: ClassVar[tuple[str, ...]] = ()
+    figures: ClassVar[tuple[Figure, ...]] = FIGURES
+    """Of an evaluation, in the order in which they are shown."""
+
+    reset_options: ClassVar[tuple[str, ...]] = ()
     """Names of the options that `reset` takes."""
 
     start_info: ClassVar[dict[str, float]] = {}
@@ -86,12 +90,13 @@ class Tasks(Independent):
         furnished = [self.furnish(world) for world in worlds or [self.config.world] * n]
         self.worlds = Worlds(self.arm, furnished, controller, n, seed, shared=not self.varies, backend=backend)
         self.tasks = np.zeros(n, dtype=task_dtype(self.reward_terms, self.own_fields))
-        self._pusher = None if self.config.pushes is None else Pusher(self.worlds, self.config.pushes)
+        self._pushes = None if self.config.pushes is None else PushSchedule(self.worlds, self.config.pushes)
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.centre)
         self._actions = np.zeros((n, ACTION_SIZE))
         self._ik = InverseKinematics(self.arm)
         self._rule = posture_rule(self.arm)
+        self._observed = tuple(vector.name for vector in self.observation_vectors)
         self.prepare()
         _warm_up(self)
 
@@ -115,6 +120,11 @@ class Tasks(Independent):
         """Return a world with what the task needs in it."""
         return world
 
+    @property
+    def observation_vectors(self) -> tuple[Observation, ...]:
+        """Fields of the records that policies observe, in order, and at which scale."""
+        raise NotImplementedError
+
     def prepare(self) -> None:
         """Make what the task needs beyond worlds and records."""
 
@@ -129,7 +139,7 @@ class Tasks(Independent):
         """Score and observe the step that tasks start to stop have run; compiled, without the GIL."""
         raise NotImplementedError
 
-    def own_parts(self) -> dict[str, Part]:
+    def own_entries(self) -> dict[str, Entry]:
         """List what decides the task's future beyond worlds, records and pushes; put back before them."""
         return {}
 
@@ -153,11 +163,11 @@ class Tasks(Independent):
         Args:
             i: which task.
             rng: draws the episode.
-            options: some of the task's `options`.
+            options: some of `reset_options`.
         """
         self.worlds.reset(i, self.posture_over(self.begin(i, rng, options)))
-        if self._pusher is not None:
-            self._pusher.begin(i, rng)
+        if self._pushes is not None:
+            self._pushes.begin(i, rng)
         controller = self.worlds.controllers[i]
         target = controller["target"]
         target["K_task"] = self.config.action.stiffness_start
@@ -187,8 +197,8 @@ class Tasks(Independent):
         if not np.isfinite(actions).all():
             raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
         self._actions[:] = actions
-        if self._pusher is not None:
-            self._pusher.step()
+        if self._pushes is not None:
+            self._pushes.step()
         ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
         self.before_step()
 
@@ -204,7 +214,7 @@ class Tasks(Independent):
 
     def observation(self, i: Any = slice(None)) -> dict[str, np.ndarray]:
         """Return what the policies observe, copied: vectors float32 (n, k), and the task's own."""
-        vectors = {name: self.tasks[name][i].astype(np.float32) for name in self.observed}
+        vectors = {name: self.tasks[name][i].astype(np.float32) for name in self._observed}
         return {**vectors, **self.own_observation(i)}
 
     @property
@@ -233,19 +243,19 @@ class Tasks(Independent):
             "is_success": tasks["success"] == 1,
         }
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the tasks' future, in the order in which it must be put back."""
-        pushes = {} if self._pusher is None else {"pushes": of_generators(self._pusher.rngs)}
+        pushes = {} if self._pushes is None else {"pushes": of_generators(self._pushes.rngs)}
         objects = {**pushes, "worlds": of_object(self.worlds)}
-        return {**self.own_parts(), **objects, "tasks": of_records(self.tasks, self.own_bounds)}
+        return {**self.own_entries(), **objects, "tasks": of_records(self.tasks, self.own_bounds)}
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the tasks' future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the tasks' future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the tasks where a snapshot was taken; see `Worlds.restore`."""
-        put(self.parts(), snapshot)
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load a state; see `Worlds.load_state_dict`."""
+        load_state_dict(self.state_entries(), state)
 
     def _checked(self, config: TaskConfig | None) -> Any:
         kind = self.config_type

@@ -10,7 +10,7 @@ from contactsafe.tasks.base.config import TaskConfig
 ACTION = ActionConfig(
     translation=(0.0005, 0.0005, 0.0005),
     rotation=(0.0025, 0.0025, 0.0025),
-    lead=0.02,
+    offset_max=0.02,
     press=0.06,
     height=0.03,
     reach=0.02,

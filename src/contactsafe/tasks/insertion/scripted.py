@@ -6,6 +6,8 @@ Each takes the task's observations and gives its actions as a policy does, 60 ti
 import numpy as np
 
 from contactsafe.core.copying import Independent
+from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.insertion.config import InsertionConfig
 
 PRESS_N = 6.0
@@ -32,14 +34,13 @@ class StraightDown(Independent):
 
     def __init__(self, config: InsertionConfig, num_envs: int):
         self._step = np.array(config.action.translation)
-        self._deepest = -config.action.press
 
     def begin(self, i: int) -> None:
         """Begin task i's next episode."""
 
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18)."""
-        actions = np.zeros((len(observation["offset"]), 18), np.float32)
+        actions = np.zeros((len(observation["offset"]), ACTION_SIZE), np.float32)
         actions[:, 2] = -_DESCENT_M_S / 60.0 / self._step[2]
         return actions
 
@@ -66,7 +67,7 @@ class SpiralSearch(Independent):
         """Choose the actions, (N, 18)."""
         offset, lead = observation["offset"][:, :3], observation["target"][:, :3]
         force = observation["force"][:, 2]
-        actions = np.zeros((len(offset), 18), np.float32)
+        actions = np.zeros((len(offset), ACTION_SIZE), np.float32)
         for i in range(len(offset)):
             self._landed[i] |= force[i] > _TOUCH_N
             inside = offset[i, 2] < -_INSIDE_M
@@ -90,3 +91,11 @@ class SpiralSearch(Independent):
         if inside or not self._landed[i]:
             return -_DESCENT_M_S / 60.0
         return 2e-4 * float(np.clip((force - PRESS_N) / PRESS_N, -1.0, 1.0))
+
+
+SCRIPTED: Scripted = {
+    "spiral": lambda config, env, seed: SpiralSearch(config, env.num_envs),
+    "straight-down": lambda config, env, seed: StraightDown(config, env.num_envs),
+    **RANDOM,
+}
+"""Scripted policies by name, made for a vector environment of the task."""

@@ -8,12 +8,15 @@ import numpy as np
 
 from contactsafe.core.rotation import quat_to_matrix, rotvec_to_quat
 from contactsafe.policy.action import DOWN
+from contactsafe.policy.observation import Observation, target_observation
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface
 from contactsafe.tasks.base.tasks import Tasks
 from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.figures import EPISODE_METRICS, FIGURES
+from contactsafe.tasks.insertion.observation import FORCE, OFFSET, TORQUE
 from contactsafe.tasks.insertion.scene import PEG, PEG_RADIUS, block, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
@@ -33,8 +36,14 @@ class InsertionTasks(Tasks):
     config_type = InsertionConfig
     reward_terms = REWARD_TERMS
     own_fields = OWN_FIELDS
-    observed = ("offset", "target", "force", "torque")
+    episode_metrics = EPISODE_METRICS
+    figures = FIGURES
     varies = True
+
+    @property
+    def observation_vectors(self) -> tuple[Observation, ...]:
+        """Offset, target, force and torque."""
+        return OFFSET, target_observation(self.config.action), FORCE, TORQUE
 
     @property
     def centre(self) -> tuple[float, float, float]:

@@ -57,8 +57,8 @@ class WipingConfig(TaskConfig):
         start_height: range of the tool's height above the board at the start, m.
         boards: what is drawn on them, 'strokes', 'digits', 'text' or 'handwriting' (lines of either); all but the
             first need `contactsafe[handwriting]`.
-        image_source: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under light
-            that changes with every episode; the latter needs `contactsafe[camera]`.
+        image_source: 'mask', the ink as it is, or 'photograph', the ink as segmentation finds it in photographs under
+            light that changes with every episode; the latter needs `contactsafe[camera]`.
         randomisation: what differs from episode to episode besides the drawing; None for nothing.
         board: the whiteboard.
         camera: what looks at it.

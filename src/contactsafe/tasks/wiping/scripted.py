@@ -1,14 +1,17 @@
-"""Scripted policies beside the learned one: a raster, a servo to the nearest ink, random actions. No torch.
+"""Scripted policies to compare a learned one with: a raster, a servo to the nearest ink, random actions. No torch.
 
 Each takes the task's observations and returns its actions as a policy does, 60 times a second.
 """
+
+from typing import Any
 
 import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.vision.log_polar import RINGS, SECTORS, foveate, ground_of
+from contactsafe.vision.log_polar import RINGS, SECTORS, ground_of, log_polar_features
 
 PRESS_N = 5.0
 """Force that the scripts press with, N."""
@@ -59,7 +62,7 @@ class _Script(Independent):
         return np.clip(actions, -1.0, 1.0)
 
     def _press(self, i, force):
-        """Compute the step of x_d downwards, m: at a steady speed to the board, then after the force."""
+        """Return the step of x_d downwards, m: at a steady speed to the board, then after the force."""
         self._landed[i] |= force > TOUCH_N
         if not self._landed[i]:
             return -DESCENT_M_S / 60.0
@@ -96,7 +99,7 @@ class Raster(_Script):
 
 
 class NearestInk(_Script):
-    """Go straight to the nearest visible ink, as a visual servo would."""
+    """Go straight to the nearest ink in view, as a visual servo would."""
 
     def __init__(self, config: WipingConfig, num_envs: int, homography: np.ndarray):
         super().__init__(config, num_envs)
@@ -105,7 +108,7 @@ class NearestInk(_Script):
 
     def act(self, observation):
         """Choose the actions, (N, 18), for N observations."""
-        picture = foveate(observation["mask"], observation["pose"], self._ground)
+        picture = log_polar_features(observation["mask"], observation["pose"], self._ground)
         soft = picture[:, RINGS * SECTORS : RINGS * SECTORS + 3]
         length = np.linalg.norm(soft[:, :2], axis=1, keepdims=True)
         self._away = 0.1 * soft[:, 2:] * soft[:, :2] / np.maximum(length, 1e-9)
@@ -118,37 +121,20 @@ class NearestInk(_Script):
         return observation["pose"][i, :2] + away * (1.0 + beyond), True
 
 
-class RandomPolicy(Independent):
-    """Actions sampled evenly from all that are allowed.
-
-    Args:
-        num_envs: tasks side by side.
-        seed: of the samples.
-    """
-
-    action_repeat = 1
-
-    def __init__(self, num_envs: int, seed: int):
-        self._rng, self._shape = np.random.default_rng(seed), (num_envs, 18)
-
-    def act(self, observation) -> np.ndarray:
-        """Sample the actions, (N, 18)."""
-        return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
+SCRIPTED: Scripted = {
+    "raster": lambda config, env, seed: Raster(config, env.num_envs),
+    "nearest-ink": lambda config, env, seed: NearestInk(config, env.num_envs, env.unwrapped.camera_homography),
+    **RANDOM,
+}
+"""Scripted policies by name, made for a vector environment of the task."""
 
 
-SCRIPTED = ("raster", "nearest-ink", "random")
-
-
-def scripted_policy(name: str, config: WipingConfig, env, seed: int):
+def scripted_policy(name: str, config: WipingConfig, env: Any, seed: int) -> Any:
     """Make a scripted policy by name for a vector environment of the task.
 
     Raises:
         InvalidInputError: there is none of that name.
     """
-    if name == "raster":
-        return Raster(config, env.num_envs)
-    if name == "nearest-ink":
-        return NearestInk(config, env.num_envs, env.unwrapped.camera_homography)
-    if name == "random":
-        return RandomPolicy(env.num_envs, seed)
-    raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")
+    if name not in SCRIPTED:
+        raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")
+    return SCRIPTED[name](config, env, seed)

@@ -8,16 +8,19 @@ import gymnasium
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.state import Entry, of_object
 from contactsafe.policy.action import DOWN
+from contactsafe.policy.observation import Observation
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.snapshot import Part, of_object
 from contactsafe.tasks.base.tasks import Tasks
 from contactsafe.tasks.wiping.board import furnish, pad_half
 from contactsafe.tasks.wiping.camera import camera_at
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.drawings import paint_board
+from contactsafe.tasks.wiping.figures import EPISODE_METRICS, FIGURES
 from contactsafe.tasks.wiping.ink import nearest_ink
+from contactsafe.tasks.wiping.observation import observation_vectors
 from contactsafe.tasks.wiping.step import OWN_FIELDS, REWARD_TERMS, finish, observe, rewards_dtype
 from contactsafe.tasks.wiping.variation import Variation
 from contactsafe.tasks.wiping.whiteboards import Whiteboards
@@ -41,7 +44,9 @@ class WipingTasks(Tasks):
     reward_terms = REWARD_TERMS
     own_fields = OWN_FIELDS
     own_bounds = {"light": (0, 2**31)}
-    options = ("drawing", "start")
+    reset_options = ("drawing", "start")
+    episode_metrics = EPISODE_METRICS
+    figures = FIGURES
     start_info = {"ink_left": 1.0}
 
     @property
@@ -57,6 +62,11 @@ class WipingTasks(Tasks):
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with the board in it."""
         return furnish(world, self.config.board)
+
+    @property
+    def observation_vectors(self) -> tuple[Observation, ...]:
+        """Pose, target and force."""
+        return observation_vectors(self.config.action)
 
     def prepare(self) -> None:
         """Hang up the boards, and what looks at them."""
@@ -136,7 +146,7 @@ class WipingTasks(Tasks):
         if self._variation is not None:
             self._variation.look(start, stop)
 
-    def own_parts(self) -> dict[str, Part]:
+    def own_entries(self) -> dict[str, Entry]:
         """List boards and what varies."""
         variation = {} if self._variation is None else {"variation": of_object(self._variation)}
         return {**variation, "boards": of_object(self.boards)}

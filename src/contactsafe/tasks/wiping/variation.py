@@ -10,8 +10,8 @@ import numpy as np
 from contactsafe.core.byte_scan import copy_picture, places_unlike
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
+from contactsafe.core.state import Entry, check_state_dict, load_state_dict, of_array, state_dict
 from contactsafe.robot.mjcf import TIP_GEOM
-from contactsafe.sim.snapshot import Part, check, of_array, put, take
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.board import Camera
 from contactsafe.tasks.wiping.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
@@ -63,27 +63,27 @@ class Variation(Independent):
         _corrupt(self._boards.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
         self._frames[i] = self._boards.masks[i]
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the future."""
         return {
-            "drawn": Part(self._taken, self._put_drawn, self._check_drawn),
+            "drawn": Entry(self._read_drawn, self._write_drawn, self._check_drawn),
             "frames": of_array(self._frames),
             "newest": of_array(self._newest, 0, MAX_DELAY_STEPS),
             "random": of_array(self._random.view(np.int64), -np.inf, np.inf),
         }
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the future."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the future."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the worlds' models where a snapshot was taken; their state is put back by the worlds, after this."""
-        put(self.parts(), snapshot)
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load the worlds' models; their state is loaded by the worlds, after this."""
+        load_state_dict(self.state_entries(), state)
 
-    def _taken(self) -> dict[str, np.ndarray]:
+    def _read_drawn(self) -> dict[str, np.ndarray]:
         return {name: self.drawn[name].copy() for name in draw_dtype.names or ()}
 
-    def _put_drawn(self, value: Mapping[str, np.ndarray]) -> None:
+    def _write_drawn(self, value: Mapping[str, np.ndarray]) -> None:
         for name in draw_dtype.names or ():
             self.drawn[name] = value[name]
         for i in range(self._worlds.n):
@@ -92,12 +92,12 @@ class Variation(Independent):
     def _check_drawn(self, value: Mapping[str, np.ndarray]) -> None:
         possible = {"camera": (0, CAMERAS - 1), **POSSIBLE}
         # Before the first draw all are 0.
-        parts = {
+        entries = {
             name: of_array(self.drawn[name], min(low, 0), high)
             for name, (low, high) in possible.items()
             if name in (draw_dtype.names or ())
         }
-        check(parts, value)
+        check_state_dict(entries, value)
 
     def _apply(self, i: int) -> None:
         self._boards.records[i]["camera"] = self.drawn[i]["camera"]

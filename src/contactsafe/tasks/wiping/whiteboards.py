@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
-from contactsafe.sim.snapshot import Part, of_array, of_records, put, take
+from contactsafe.core.state import Entry, load_state_dict, of_array, of_records, state_dict
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.camera import camera_tables, plane_homography, render_mask, stack_cameras
 from contactsafe.tasks.wiping.ink import empty_ink_index, enter
@@ -71,7 +71,7 @@ class Whiteboards(Independent):
         for board, cells in zip(self.boards, self.cells, strict=True):
             board.cells = cells
 
-    def parts(self) -> dict[str, Part]:
+    def state_entries(self) -> dict[str, Entry]:
         """List what decides the boards' future."""
         bounds = {"camera": (0, len(self.cameras.pixels) - 1), "pad_half": (-1e9, 1e9)}
         return {
@@ -80,13 +80,13 @@ class Whiteboards(Independent):
             "masks": of_array(self.masks),
         }
 
-    def snapshot(self) -> dict[str, Any]:
-        """Take all that decides the boards' future, as plain values and arrays."""
-        return take(self.parts())
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that decides the boards' future, as plain values and arrays."""
+        return state_dict(self.state_entries())
 
-    def restore(self, snapshot: Mapping[str, Any]) -> None:
-        """Put the boards where a snapshot was taken."""
-        put(self.parts(), snapshot)
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Load a state."""
+        load_state_dict(self.state_entries(), state)
         for i in range(self.n):
             self.enter_ink(i)
 

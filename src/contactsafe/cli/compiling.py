@@ -4,12 +4,13 @@ import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
-import gymnasium
 import numpy as np
 
 from contactsafe.control.controller import Controller
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.arm import Arm, arm_from_description
@@ -17,17 +18,15 @@ from contactsafe.robot.franka import HAND
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import panda
 from contactsafe.sim.worlds import Worlds
-from contactsafe.tasks import ENGINES
-from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.randomisation import Randomisation
-from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.tasks import DEFAULT_TASK, TASKS, make_vec, task_by_name
+from contactsafe.tasks.base.task import Task
 from contactsafe.vision.rectify import rectify
 
 MOST_JOINTS = 14
 
 
 def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
-    """Give what is to be done, by name.
+    """Return what is to be done, by name.
 
     Args:
         joints: numbers of joints of the arms that will be driven.
@@ -38,15 +37,31 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
     for word in joints:
         if not word.isdecimal() or not 1 <= int(word) <= MOST_JOINTS:
             raise InvalidInputError(f"joints = {word}; give numbers from 1 to {MOST_JOINTS}, such as 6,7")
-    return {
-        **{f"controller, {word} joints": partial(_control, int(word)) for word in joints},
-        "worlds": _run_worlds,
-        "wiping": partial(_wipe, ENGINES["mujoco"], WipingConfig()),
-        "wiping, randomised": partial(_wipe, ENGINES["mujoco"], WipingConfig(randomisation=Randomisation.broad())),
-        **({"photographs": _photograph} if importlib.util.find_spec("cv2") else {}),
-        **({"wiping in PyBullet": _wipe_in_bullet} if importlib.util.find_spec("pybullet") else {}),
-        "policy and eyes": _see,
+    found: dict[str, Callable[[], object]] = {
+        f"controller, {word} joints": partial(_control, int(word)) for word in joints
     }
+    found["worlds"] = _run_worlds
+    for name in TASKS:
+        found |= {f"{name}{what}": run for what, run in _of_task(task_by_name(name)).items()}
+    return found | {"policy and encoder": _see}
+
+
+def _of_task(task: Task) -> dict[str, Callable[[], object]]:
+    """Return the runs that compile all variants of a task, by what follows its name."""
+    runs: dict[str, Callable[[], object]] = {"": partial(_do, task.name, task.config())}
+    if task.training:
+        runs[", randomised"] = partial(_do, task.name, task.training_config(True))
+    for package, name, config, engine in task.variants:
+        if importlib.util.find_spec(package):
+            runs[name] = partial(_do, task.name, config, engine)
+    return runs
+
+
+def _do(task: str, config: Any, engine: str = "mujoco") -> None:
+    envs = make_vec(task, 1, config, engine)
+    envs.reset(seed=0)
+    envs.step(np.zeros((1, ACTION_SIZE), np.float32))
+    envs.close()
 
 
 def _control(n: int) -> None:
@@ -63,26 +78,13 @@ def _run_worlds() -> None:
     worlds = Worlds(panda())
     worlds.reset(0, worlds.arm.home)
     worlds.run(1)
-    worlds.render()
-
-
-def _wipe(task: str, config: WipingConfig) -> None:
-    envs = gymnasium.make_vec(task, num_envs=1, config=config)
-    envs.reset(seed=0)
-    envs.step(np.zeros((1, 18), np.float32))
-    envs.close()
-
-
-def _photograph() -> None:
-    _wipe(ENGINES["mujoco"], WipingConfig(image_source="photograph"))
-
-
-def _wipe_in_bullet() -> None:
-    _wipe(ENGINES["pybullet"], WipingConfig())
 
 
 def _see() -> None:
-    sampler = MaskSampler()
+    make_sampler = task_by_name(DEFAULT_TASK).mask_sampler
+    if make_sampler is None:
+        return
+    sampler = make_sampler()
     masks, tools = sampler.sample(2, 0)
-    Policy(shipped_bundle(), sampler.homography)
+    Policy(shipped_bundle(DEFAULT_TASK), sampler.homography)
     rectify(masks[..., None], tools, sampler.homography, 0.64, 64)

@@ -1,4 +1,4 @@
-"""Worlds put back where they were go on as they did, to the bit, in the same process or in new memory."""
+"""Worlds given a state they had go on as they did, to the bit, in the same process or in new memory."""
 
 import numpy as np
 import pytest
@@ -37,10 +37,10 @@ def assert_same(a, b):
 
 @pytest.fixture(scope="module")
 def course():
-    """A snapshot amidst a course of events, and how it went on."""
+    """A state amidst a course of events, and how it went on."""
     worlds = busy_worlds(3)
     begin(worlds)
-    snapshot = worlds.snapshot()
+    state = worlds.state_dict()
     trace = run(worlds, 120)
     yield worlds, snapshot, trace
     worlds.close()
@@ -57,7 +57,7 @@ def test_the_course_has_what_could_be_forgotten(course):
 def test_the_same_worlds_go_on_alike(course):
     worlds, snapshot, trace = course
     run(worlds, 30)
-    worlds.restore(snapshot)
+    worlds.load_state_dict(state)
     assert_same(run(worlds, 120), trace)
 
 
@@ -65,7 +65,7 @@ def test_new_worlds_go_on_alike(course):
     _, snapshot, trace = course
     fresh = busy_worlds(99)
     addresses = fresh.records["plant"]["data"].copy(), fresh.controllers["handle"].copy()
-    fresh.restore(snapshot)
+    fresh.load_state_dict(snapshot)
     assert_same(run(fresh, 120), trace)
     assert_array_equal(fresh.records["plant"]["data"], addresses[0])
     assert_same(fresh.controllers["handle"], addresses[1])
@@ -77,7 +77,7 @@ def test_new_worlds_draw_the_same_bias_at_their_next_reset(course):
     biases = []
     for _ in range(2):
         worlds = busy_worlds(None)
-        worlds.restore(snapshot)
+        worlds.load_state_dict(state)
         worlds.reset(1, panda().home)
         biases.append(worlds.records["errors"]["wrench_bias"][1].copy())
         worlds.close()
@@ -110,9 +110,9 @@ def test_a_snapshot_of_something_else_is_refused(course):
     with pytest.raises(
         InvalidInputError, match=r"^the snapshot holds noise, not controllers, metrics, noise, .*; start anew$"
     ):
-        worlds.restore({"noise": snapshot["noise"]})
+        worlds.load_state_dict({"noise": snapshot["noise"]})
     with pytest.raises(InvalidInputError) as error:
-        worlds.restore({**snapshot, "metrics": {**snapshot["metrics"], "ticks": np.zeros(3, dtype=np.int64)}})
+        worlds.load_state_dict({**snapshot, "metrics": {**snapshot["metrics"], "ticks": np.zeros(3, dtype=np.int64)}})
     assert str(error.value) == "the snapshot holds an array (3,) for one of (2,); start anew"
 
 
@@ -132,11 +132,11 @@ def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, pa
     corrupt = {**snapshot, part: {name: array.copy() for name, array in snapshot[part].items()}}
     corrupt["metrics"] = {name: np.zeros_like(array) for name, array in snapshot["metrics"].items()}
     corrupt[part][field].reshape(-1)[-1] = value
-    before = worlds.snapshot()
+    before = worlds.state_dict()
     with pytest.raises(InvalidInputError, match=r"^the snapshot holds .* start anew$") as error:
-        worlds.restore(corrupt)
+        worlds.load_state_dict(corrupt)
     assert f"({part}.{field})" in str(error.value)
-    after = worlds.snapshot()
+    after = worlds.state_dict()
     assert_array_equal(after["metrics"]["ticks"], before["metrics"]["ticks"])
     assert_array_equal(after["records"]["tick"], before["records"]["tick"])
 
@@ -144,6 +144,6 @@ def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, pa
 def test_a_random_generator_whose_state_is_an_index_is_refused(course):
     worlds, snapshot, _ = course
     twister = {"bit_generator": "MT19937", "state": {"key": [0] * 624, "pos": 10**9}}
-    for state in (twister, {"bit_generator": "seed"}, {}, {**snapshot["noise"][0], "state": {"state": ["x"]}}):
+    for spoilt in (twister, {"bit_generator": "seed"}, {}, {**state["noise"][0], "state": {"state": ["x"]}}):
         with pytest.raises(InvalidInputError, match="which is not the state of a random generator"):
-            worlds.restore({**snapshot, "noise": [state, state]})
+            worlds.load_state_dict({**state, "noise": [spoilt, spoilt]})

@@ -1,8 +1,8 @@
-"""Compare the eyes: how much of the ink, and the last of it, can still be read off what each of them makes of the mask.
+"""Compare vision encoders: how much of the ink, and the last of it, can be read off the latent of each.
 
-`python docs/eyes.py` prints the table of docs/concepts/eyes.md. All see the same held-out boards, and the same small
-networks read them: one says where the nearest ink lies, one marks the cells of 2 cm about the tool that hold ink. What
-they cannot read, a policy of that size will not learn to use.
+`python docs/vision_encoders.py` prints the table of docs/concepts/vision.md. All see the same held-out boards,
+and the same small networks read them: one says where the nearest ink lies, one marks the cells of 2 cm about the tool
+that hold ink. What they cannot read, a policy of that size will not learn to use.
 """
 
 import sys
@@ -165,11 +165,11 @@ def main():
     sampler = MaskSampler()
     train, test = boards(sampler, PICTURES, 0), boards(sampler, HELD_OUT, HELD_OUT_SEED)
     heads = [f"{low} to {high - 1} pixels" for low, high in AMOUNTS[:-1]] + [f"{AMOUNTS[-1][0]} and more"]
-    print("| eyes | numbers | active | min | " + " | ".join(heads) + " |\n|" + "---|" * (4 + len(heads)))
-    foveated = Perception(None, "foveated", WINDOW_M, train.masks.shape[1], sampler.homography)
+    print("| encoder | numbers | active | min | " + " | ".join(heads) + " |\n|" + "---|" * (4 + len(heads)))
+    features = Perception(None, "log_polar", WINDOW_M, train.masks.shape[1], sampler.homography)
     with TemporaryDirectory() as folder:
         for name, make in (
-            ("foveated", lambda: (foveated, None)),
+            ("log-polar", lambda: (features, None)),
             ("β-VAE, tool's frame, 128", lambda: vae_numbers(sampler, folder, "tool", 2)),
             ("β-VAE, tool's frame, 64", lambda: vae_numbers(sampler, folder, "tool", 1)),
             ("β-VAE, camera's frame, 128 (paper), and the pose", lambda: vae_numbers(sampler, folder, "paper", 2)),

@@ -1,4 +1,4 @@
-"""An environment put back where it was goes on as it did, new boards and all."""
+"""An environment given a state they had goes on as it did, new boards and all."""
 
 import gymnasium
 import numpy as np
@@ -27,9 +27,9 @@ def test_a_new_environment_goes_on_as_the_old_one_did():
     first, second = make(), make()
     first.reset(seed=4)
     course(first, 13, 0)
-    snapshot = first.unwrapped.snapshot()
+    state = first.unwrapped.state_dict()
     before = course(first, 25, 1)
-    second.unwrapped.restore(snapshot)
+    second.unwrapped.load_state_dict(state)
     after = course(second, 25, 1)
     assert before[4].sum() == 3 * 3
     for a, b in zip(before, after, strict=True):

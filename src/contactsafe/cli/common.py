@@ -1,0 +1,41 @@
+"""What commands have in common: kinds of options, the progress bar, and the word before the first compilation."""
+
+import functools
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from contactsafe.control import presets
+from contactsafe.core.compiled import CACHE_FOLDER
+from contactsafe.core.parse import some_of
+from contactsafe.policy.bundle import Bundle, shipped_bundle
+from contactsafe.tasks import DEFAULT_TASK
+
+COMPILES = "the first run compiles for a minute or two"
+
+Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS)]
+BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
+
+
+def load_bundle(folder: Path | None, task: str = DEFAULT_TASK) -> Bundle:
+    """Load a bundle from its folder; the one that is shipped for the task where there is no folder."""
+    return Bundle.load(folder or shipped_bundle(task))
+
+
+@functools.cache
+def first_run() -> bool:
+    """Tell whether this version has compiled nothing yet; asked once, before it does."""
+    return not any(Path(CACHE_FOLDER).rglob("*.nbi"))
+
+
+def described(what: str) -> str:
+    """Return what is being done, and that it compiles first where it does."""
+    return f"{what} ({COMPILES})" if first_run() else what
+
+
+def progress(what: str, total: int) -> tqdm:
+    """Begin a progress bar on stderr."""
+    return tqdm(total=total, desc=described(what), file=sys.stderr)

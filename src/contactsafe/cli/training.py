@@ -1,0 +1,84 @@
+"""`contactsafe train`: the vision encoder and the policies."""
+
+import importlib.util
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from contactsafe.cli.common import COMPILES, first_run
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.parse import parse
+from contactsafe.experiments.results import to_json
+from contactsafe.policy.bundle import FOLDER
+from contactsafe.tasks import TASKS, task_by_name
+
+KINDS = ("vae", "ppo", "sac")
+
+_HELP = f"""usage: contactsafe train {{{",".join(KINDS)}}} [options]
+
+  vae  the vision encoder: log-polar features, which need no training, or a
+       β-VAE; writes runs/vae
+  ppo  a policy; reads runs/vae where its task has a camera, writes runs/ppo
+       and runs/ppo/bundle
+  sac  the same with SAC, which learns soon but does not get as far;
+       writes runs/sac
+
+--task NAME says what is learned: {", ".join(TASKS)}. All show a progress bar
+and log to TensorBoard. A run that was stopped or killed goes on with --resume
+from its last epoch or rollout, with the settings of its last session where none
+are given, and ends with the weights that it would have had.
+`contactsafe train ppo --help` lists the settings of PPO."""
+
+
+def train(arguments: Sequence[str]) -> None:
+    """Prepare the vision encoder (vae) or train a policy (ppo, sac)."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_HELP)
+        if not arguments:
+            raise SystemExit(2)
+        return
+    name = arguments[0]
+    if name not in KINDS:
+        raise InvalidInputError(f"'contactsafe train {name}' is unknown; choose {', '.join(KINDS[:-1])} or {KINDS[-1]}")
+    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InvalidInputError(f"training needs {', '.join(missing)}; run: pip install 'contactsafe[train]'")
+    if name == "vae":
+        _train_encoder(list(arguments[1:]))
+    else:
+        _train_policy(name, list(arguments[1:]))
+
+
+def _settings(kind: type, program: str, words: list[str]) -> Any:
+    """Read the settings of a training; where it goes on, those of its last session stay unless words say otherwise."""
+    from contactsafe.learning.settings import as_started
+
+    config = parse(kind, program, words)
+    return parse(kind, program, words, default=as_started(config)) if config.resume else config
+
+
+def _train_encoder(arguments: list[str]) -> None:
+    from contactsafe.learning.train_vae import VaeConfig, train_vae
+
+    config = _settings(VaeConfig, "contactsafe train vae", arguments)
+    make_sampler = task_by_name(config.task).mask_sampler
+    if make_sampler is None:
+        raise InvalidInputError(f"task '{config.task}' has no camera; it needs no vision encoder")
+    sampler = make_sampler()
+    report = train_vae(config, sampler.sample, sampler.homography)
+    shown = ("representation", "active_latents", "reconstruction", "nearest_foreground")
+    print(to_json({name: report[name] for name in shown if name in report}))
+    print(f"encoder: {config.out}; next: contactsafe train ppo --encoder {config.out}")
+
+
+def _train_policy(algorithm: str, arguments: list[str]) -> None:
+    from contactsafe.learning.algorithms import ALGORITHMS
+    from contactsafe.learning.train_policy import train_policy
+
+    config = _settings(ALGORITHMS[algorithm], f"contactsafe train {algorithm}", arguments)
+    if first_run():
+        print(f"contactsafe: {COMPILES}", file=sys.stderr)
+    results = train_policy(config)
+    if results:
+        print(to_json(results))
+    print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}")
