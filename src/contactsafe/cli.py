@@ -6,7 +6,7 @@ import importlib.util
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,11 +21,12 @@ from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.core.parse import call, docstring, one_of, parse, some_of
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
-from contactsafe.experiments.results import Experiment, to_json
 from contactsafe.policy.bundle import FOLDER, MANIFEST, Bundle, digest, shipped_bundle
+from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.sim.drawings import Boards
 from contactsafe.tasks import ENGINES
 from contactsafe.tasks.wiping.config import Sight, WipingConfig
+from contactsafe.tasks.wiping.scenes import Wiping
 from contactsafe.tasks.wiping.scripted import REFERENCES
 
 _COMPILES = "the first run compiles for a minute or two"
@@ -61,13 +62,13 @@ def demo(
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
 
-    config = ExperimentConfig(controllers, trials, seed)
     loaded = Bundle.load(bundle or shipped_bundle())
+    config = ExperimentConfig(controllers, trials, seed, task=Wiping(), bundle=loaded)
     folder = prepare_output(out)
     started = time.monotonic()
-    results = _run(registry.PAPER, loaded, config)
-    description = _facts("contactsafe demo", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, description)
+    results = _run(registry.PAPER, config)
+    info = _run_info("contactsafe demo", config, time.monotonic() - started)
+    page = write_report(folder, results, info)
     print(terminal_table(results))
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
 
@@ -85,13 +86,7 @@ def experiment(
 ) -> None:
     """Run one of the experiments.
 
-      task-safety   the policy wipes boards never seen: how hard does it press?
-      joint-safety  the forearm runs into an obstacle while the policy works.
-      disturbance   somebody leans on the arm with 25 N.
-      collisions    random motions meet random obstacles anywhere on the arm.
-      detection     how soon is a contact reported, where, how often falsely?
-      hostile       a policy asks for the impossible: are all limits kept?
-      clock         ticks late, measurements lost, frozen or impossible, no policy.
+      EXPERIMENTS
 
     The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
     of any batch once more and draws it.
@@ -111,14 +106,15 @@ def experiment(
     from contactsafe.report.summary import summarise
 
     entry = registry.by_name(name)
-    config = ExperimentConfig(controllers, entry.trials if trials is None else trials, seed, plants, minutes)
-    loaded = Bundle.load(bundle or shipped_bundle()) if bundle or entry.needs_policy else None
+    config = ExperimentConfig(controllers, entry.trials if trials is None else trials, seed, plants, minutes, Wiping())
+    if bundle or entry.needs_policy:
+        config = replace(config, bundle=Bundle.load(bundle or shipped_bundle()))
     folder = prepare_output(out) if out else None
     started = time.monotonic()
-    results = _run([name], loaded, config)
-    description = _facts(f"contactsafe experiment {name}", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, description) if folder else None
-    print(to_json(summarise(results, description)) if json else terminal_table(results))
+    results = _run([name], config)
+    info = _run_info(f"contactsafe experiment {name}", config, time.monotonic() - started)
+    page = write_report(folder, results, info) if folder else None
+    print(to_json(summarise(results, info)) if json else terminal_table(results))
     if page:
         print(f"report: {page}", file=sys.stderr)
 
@@ -208,7 +204,7 @@ def bench(json: bool = False, bundle: BundleFolder = None) -> None:
 
     loaded = Bundle.load(bundle or shipped_bundle())
     with _bar("rounds", ROUNDS) as bar:
-        speeds = measure_speed(loaded, bar.update)
+        speeds = measure_speed(Wiping(), loaded, bar.update)
     if json:
         print(to_json([asdict(speed) for speed in speeds]))
         return
@@ -312,6 +308,11 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}")
 
 
+experiment.__doc__ = docstring(experiment).replace(
+    "  EXPERIMENTS", "\n".join(f"  {entry.name:14s}{entry.about}" for entry in registry.ENTRIES.values())
+)
+
+
 @dataclass(frozen=True)
 class _Command:
     run: Callable
@@ -342,34 +343,31 @@ def _bar(what: str, total: int) -> tqdm:
     return tqdm(total=total, desc=_described(what), file=sys.stderr)
 
 
-def _run(names: Sequence[str], bundle: Bundle | None, config: ExperimentConfig) -> list[Experiment]:
+def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:
     entries = {name: registry.by_name(name) for name in names}
     results = []
     with _bar(names[0], sum(entry.count(config) for entry in entries.values())) as bar:
         for name, entry in entries.items():
             bar.set_description_str(_described(name))
-            results.append(entry.run(bundle, config, bar.update))
+            results.append(entry.run(config, bar.update))
     return results
 
 
-def _facts(command: str, config: ExperimentConfig, bundle: Bundle | None, seconds: float) -> dict:
-    from contactsafe.experiments.disturbance import PUSH_S
-
+def _run_info(command: str, config: ExperimentConfig, seconds: float) -> dict:
     words = [command, f"--trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}"]
     if config.plants != ExperimentConfig.plants:
         words.append(f"--plants {','.join(config.plants)}")
     if config.minutes != ExperimentConfig.minutes:
         words.append(f"--minutes {config.minutes:g}")
-    description = {
+    info = {
         "command": " ".join(words),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(config.seeds),
-        "push_s": PUSH_S,
         "seconds": round(seconds, 1),
     }
-    if bundle is not None:
-        description["bundle_sha256"] = digest((Path(bundle.folder) / MANIFEST).read_bytes())
-    return description
+    if config.bundle is not None:
+        info["bundle_sha256"] = digest((Path(config.bundle.folder) / MANIFEST).read_bytes())
+    return info
 
 
 def _help() -> str:

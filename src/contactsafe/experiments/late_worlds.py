@@ -31,25 +31,26 @@ class LateWorlds(Worlds):
     """
 
     def __init__(
-        self, arm: Arm, worlds: Sequence[WorldConfig], controller: ControllerConfig, seeds: Sequence[int], codes, timed
-    ):
+        self, arm: Arm, worlds: Sequence[WorldConfig], controller: ControllerConfig, seeds: Sequence[int],
+        codes: np.ndarray, timed: bool,
+    ):  # fmt: skip
         super().__init__(arm, worlds, controller, len(worlds), seeds)
         self.codes, self.timed = np.asarray(codes, dtype=np.int64), timed
         self._held = np.zeros((len(worlds), 2 * arm.n + 7))
 
-    def run(self, ticks, trace: np.ndarray | None = None) -> None:
+    def run(self, ticks: int | np.ndarray, trace: np.ndarray | None = None) -> None:
         """Run control ticks in every world; see `Worlds.run`."""
         ticks = self._checked(ticks, trace)
         traces = self.no_trace if trace is None else trace
 
-        def share(start: int, stop: int) -> None:
+        def chunk(start: int, stop: int) -> None:
             noise = self.sample_noise(start, stop)
             _run_late(
                 start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces, self.codes,
                 self.timed, self._held,
             )  # fmt: skip
 
-        self.in_threads(share)
+        self.in_threads(chunk)
 
 
 @compiled(nogil=True)
@@ -106,7 +107,7 @@ class LatePlayback(Playback):
         self._silent = silent
 
     def record(self) -> np.ndarray:
-        """Play to the end; give `trace_dtype` records, (n, ticks)."""
+        """Play to the end; return `trace_dtype` records, (n, ticks)."""
         step = np.zeros((self.worlds.n, MAX_TICKS), dtype=trace_dtype(self.worlds.arm.n))
         pieces = []
         while self.running.any():

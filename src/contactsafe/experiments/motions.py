@@ -1,4 +1,4 @@
-"""Playing motions in simulated worlds: x_d goes its way, at 60 Hz as a policy would move it."""
+"""Playing motions in simulated worlds: x_d follows its path, moved once a policy step."""
 
 import math
 from collections.abc import Sequence

@@ -1,0 +1,210 @@
+"""The wiping task as the experiments see it: boards to wipe, a lure beside an obstacle, strokes under pushes."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from contactsafe.policy.action import DOWN
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.policy.observation import ACTION_SIZE
+from contactsafe.results.figures import Figure
+from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.sim.camera import render_mask_into
+from contactsafe.sim.config import Obstacle, WorldConfig
+from contactsafe.sim.world import POLICY_RATE_HZ, Worlds
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
+from contactsafe.tasks.wiping import pictures
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
+
+LURE_CENTRE, LURE_SIZE = (0.5, -0.24), (0.10, 0.06)
+"""A dark object on the right of the board, unknown to the policy, which takes it for ink; m."""
+
+OBSTACLE_AT = (-0.12, -0.06)
+"""Range of the tool's y at which the forearm meets the obstacle, m."""
+
+_HOLD_HEIGHT = 0.06  # m above the board
+_PRESS = 0.004  # depth of x_d below the board while wiping, m
+_ABOVE = 0.001  # start of the strokes above the board, m
+_STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
+
+Begin = Callable[[WipingTasks, int, np.random.Generator], None]
+"""Begins one task's episode from its generator."""
+
+
+class WipingEpisodes:
+    """Held-out boards, one a seed; see `contactsafe.experiments.task.Episodes`.
+
+    Args:
+        tasks: that run them.
+        seeds: of the episodes.
+        begin: begins one of them; on a board and from a start drawn at random where None.
+        rngs: of the episodes; what was drawn from them before is not drawn again.
+    """
+
+    def __init__(
+        self,
+        tasks: WipingTasks,
+        seeds: Sequence[int],
+        begin: Begin | None = None,
+        rngs: Sequence[np.random.Generator] | None = None,
+    ):
+        self.tasks, self.seeds = tasks, seeds
+        self._begin: Begin = begin or WipingTasks.reset
+        self.begin(rngs)
+
+    def begin(self, rngs: Sequence[np.random.Generator] | None = None) -> None:
+        """Begin all of them."""
+        for i, rng in enumerate(rngs or [held_out(seed) for seed in self.seeds]):
+            self._begin(self.tasks, i, rng)
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        return self.tasks.arm
+
+    @property
+    def worlds(self) -> Worlds:
+        """The simulation below."""
+        return self.tasks.worlds
+
+    @property
+    def step_limit(self) -> int:
+        """Policy steps of an episode."""
+        return self.tasks.step_limit
+
+    @property
+    def terminated(self) -> np.ndarray:
+        """Whether each board is clean or the arm has met the table, (n,)."""
+        return self.tasks.terminated
+
+    @property
+    def succeeded(self) -> np.ndarray:
+        """Whether each board is clean, (n,)."""
+        return self.tasks.tasks["clean"] == 1
+
+    @property
+    def camera_homography(self) -> np.ndarray:
+        """Board-plane coordinates (x, y, 1), m, to mask pixels (u, v, w), (3, 3)."""
+        return self.tasks.worlds.homography
+
+    def observation(self) -> dict[str, np.ndarray]:
+        """Return what the policies see."""
+        return self.tasks.observation()
+
+    def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
+        """Run one policy step in each."""
+        self.tasks.step(actions, traces)
+
+    def curves(self) -> Mapping[str, np.ndarray]:
+        """Return the fraction of the ink that is left, (n,)."""
+        return {"ink_left": self.tasks.info()["ink_left"]}
+
+    def pictures(self) -> np.ndarray:
+        """Return the boards' cells, uint8 (n, rows, columns), copied."""
+        return self.tasks.worlds.cells.copy()
+
+    def parts(self) -> Mapping[str, tuple[Callable[[], object], int]]:
+        """Return what is worth timing by itself: the mask."""
+        worlds = self.tasks.worlds
+        size = worlds.masks.shape[1]
+
+        def mask() -> None:
+            render_mask_into(worlds.camera, worlds.ink_index.shown[0], worlds.plants[0], worlds.masks[0])
+
+        return {f"mask, {size} × {size}": (mask, 50)}
+
+
+class Wiping:
+    """The wiping task for `contactsafe.experiments.task.ExperimentTask`."""
+
+    name = pictures.NAME
+    policy = pictures.POLICY
+    metrics: tuple[Metric, ...] = pictures.METRICS
+    highlights: tuple[Highlight, ...] = pictures.HIGHLIGHTS
+    figures: tuple[Figure, ...] = (pictures.FORCES,)
+    stage = pictures.STAGE
+
+    def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
+        """Return held-out boards."""
+        return WipingEpisodes(WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds)), seeds)
+
+    def towards_obstacle(
+        self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
+    ) -> WipingEpisodes:
+        """Return boards with a lure on the right, begun on the left, and an obstacle between."""
+        probe, rngs = WipingTasks(WipingConfig()), [held_out(seed) for seed in seeds]
+        obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
+        worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
+        tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds), worlds)
+        return WipingEpisodes(tasks, seeds, _lured, rngs)
+
+    def scripted(
+        self,
+        controller: str,
+        seeds: Sequence[int],
+        worlds: Sequence[WorldConfig],
+        stiffness: Sequence[float],
+        works: bool,
+    ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
+        """Return boards and a script: strokes, or nothing just above the board."""
+        action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
+        tasks = WipingTasks(WipingConfig(controller=controller, action=action), len(seeds), list(seeds), worlds)
+        x, y, z = tasks.config.world.board.centre
+        start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
+        episodes = WipingEpisodes(tasks, seeds, lambda tasks, i, rng: tasks.reset(i, rng, start=start))
+        return episodes, strokes(action) if works else _nothing
+
+    def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
+        """Return how much ink went, whether the board is clean, and how long that took."""
+        return {
+            "ink_removed": float(1.0 - curves["ink_left"][-1]),
+            "clean": float(succeeded),
+            "time_s": float(trace["time"][-1]) if succeeded else float("nan"),
+        }
+
+
+def held_out(seed: int) -> np.random.Generator:
+    """Return the generator of an episode's board and start: none that training has drawn from."""
+    return np.random.default_rng(HELD_OUT_SEED + seed)
+
+
+def meeting_posture(tasks: WipingTasks, rng: np.random.Generator) -> np.ndarray:
+    """Sample joint positions at which the forearm meets the obstacle on the tool's path to the lure, (n,), rad."""
+    x, _, z = tasks.config.world.board.centre
+    return tasks.posture_over(Pose(np.array([x, rng.uniform(*OBSTACLE_AT), z]), DOWN))
+
+
+def _lured(tasks: WipingTasks, i: int, rng: np.random.Generator) -> None:
+    x, y, z = tasks.config.world.board.centre
+    # On the left half of the board: never beyond the obstacle to begin with.
+    tasks.reset(i, rng, start=(x + rng.uniform(-0.1, 0.1), y + rng.uniform(0.0, 0.1), z + 0.05))
+    tasks.worlds.boards[i].place_object(LURE_CENTRE, LURE_SIZE)
+    tasks.observe(i)
+
+
+def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
+    return np.zeros((len(observation["pose"]), ACTION_SIZE))
+
+
+def strokes(action: ActionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
+    """Return a script that presses the pad on the board and strokes sideways from where the tool stands.
+
+    Args:
+        action: what an action of 1 stands for.
+    """
+    step = 0
+
+    def act(observation: dict[str, np.ndarray]) -> np.ndarray:
+        nonlocal step
+        actions = np.zeros((len(observation["pose"]), ACTION_SIZE))
+        phase = 2 * math.pi / (POLICY_RATE_HZ * _PERIOD_S)
+        actions[:, 1] = _STROKE * (math.sin(phase * (step + 1)) - math.sin(phase * step)) / action.translation[1]
+        down = (_ABOVE + _PRESS) / 6  # over the first six steps
+        actions[:, 2] = -down / action.translation[2] if step < 6 else 0.0
+        step += 1
+        return actions
+
+    return act
