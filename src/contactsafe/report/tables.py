@@ -64,7 +64,7 @@ def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bo
     return (
         '<div class="wide"><table><thead><tr><th>median [p5, p95] over seeds</th><th></th>'
         f'{head}<th class="aim">aim</th></tr></thead><tbody>{"".join(body)}</tbody></table></div>'
-        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the middle over seeds, '
+        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the median or mean shown, '
         "“always” on the largest of all runs.</p>"
     )
 
