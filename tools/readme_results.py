@@ -16,12 +16,12 @@ def table(summary: dict[str, Any]) -> str:
     lines: list[str] = []
     for experiment in summary["experiments"].values():
         for highlight in experiment["highlights"]:
-            metric = experiment["metrics"][highlight["metric"]]
-            spreads = {name: row[highlight["metric"]] for name, row in experiment["spread"][highlight["scenario"]].items()}
+            name = highlight["metric"]
+            metric, rows = experiment["metrics"][name], experiment["spread"][highlight["scenario"]]
             if not lines:
-                lines.append(f"| median [p5, p95] over seeds | unit | {' | '.join(spreads)} |")
-                lines.append("|---|---|" + "---|" * len(spreads))
-            cells = [_cell(spread, metric) for spread in spreads.values()]
+                lines.append(f"| median [p5, p95] over seeds | unit | {' | '.join(rows)} |")
+                lines.append("|---|---|" + "---|" * len(rows))
+            cells = [_cell(row[name], metric) for row in rows.values()]
             lines.append(f"| {highlight['label']} | {metric['unit']} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
