@@ -54,7 +54,10 @@ class LateWorlds(Worlds):
 
 
 @compiled(nogil=True)
-def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, traces, codes, timed, held):
+def _run_late(
+    start: int, stop: int, plants: np.ndarray, controllers: np.ndarray, cells: np.ndarray, noise: np.ndarray,
+    ticks: np.ndarray, reports: np.ndarray, traces: np.ndarray, codes: np.ndarray, timed: bool, held: np.ndarray,
+) -> None:  # fmt: skip
     for i in range(start, stop):
         plant, controller = plants[i], controllers[i]
         begin_step_metrics(reports[i], ticks[i])
@@ -72,7 +75,7 @@ def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, tr
 
 
 @compiled
-def _corrupt(measurement, code, held):
+def _corrupt(measurement: np.record, code: int, held: np.ndarray) -> None:
     """Make of a measurement what the controller sees; `held` has the last one as it was seen."""
     n = measurement.q.shape[0]
     if code == FROZEN:

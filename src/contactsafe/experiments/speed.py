@@ -41,13 +41,13 @@ class Speed:
 
 
 @compiled(nogil=True)
-def _bare_physics(model, data, n):
+def _bare_physics(model: int, data: int, n: int) -> None:
     for _ in range(n):
         mj_step(model, data)
 
 
 @compiled(nogil=True)
-def _ticks(controller, n):
+def _ticks(controller: np.record, n: int) -> None:
     controller.measurement.qd[:] = 0.0  # one that moves and never changes is not believed
     for _ in range(n):
         control_tick(controller)
