@@ -25,7 +25,6 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
-from contactsafe.experiments.run import Run
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
@@ -38,6 +37,7 @@ from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.env import WipingEnv
 from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.tasks.wiping.scenes import Wiping
 from contactsafe.tasks.wiping.scripted import Chance, NearestInk, Raster
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
@@ -95,6 +95,11 @@ def run_tasks(tasks):
     step = int(tasks.tasks["steps"][0])
     tasks.step(ACTIONS[step, : tasks.worlds.n])
     return [*tasks.observation().values(), tasks.reward, tasks.worlds.plants["q_seen"].copy()]
+
+
+def run_episodes(episodes):
+    episodes.step(np.full((episodes.worlds.n, 18), 0.3))
+    return [episodes.observation()["pose"], episodes.curves()["ink_left"], episodes.pictures()]
 
 
 def step_env(env):
@@ -295,7 +300,8 @@ ACTORS = {
     "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
     "Chance": (lambda: Chance(2, 0), lambda r: [r.act(observation())]),
     "Threads": (begun(lambda: Threads(2), share), share),
-    "Run": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
+    "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
+    "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Plotter": (plotter, lambda p: [p._count]),
 }
 """How each is made in the midst of what it does, and what it does next, as arrays."""

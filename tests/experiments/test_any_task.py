@@ -55,10 +55,10 @@ def test_joint_safety_puts_each_obstacle_before_the_forearm(config, monkeypatch)
     assert found.stage == TASK.stage
 
 
-def test_disturbance_pushes_while_holding_and_while_the_task_works(config, monkeypatch):
+def test_disturbance_pushes_at_rest_and_while_the_task_works(config, monkeypatch):
     monkeypatch.setattr("contactsafe.experiments.disturbance.PUSH_POINTS", {5: PUSH_POINTS[5]})
     found = disturbance(config)
-    assert list(found.spreads()) == ["push on link 5 while holding", "push on link 5 while reaching"]
+    assert list(found.spreads()) == ["push on link 5 while at rest", "push on link 5 while reaching"]
     for trial in found.trials:
         assert trial.metrics["error_max_mm"] > 1.0
     shaded = found.figures[0].shaded(found.recordings[0])

@@ -77,7 +77,7 @@ def test_deviation_is_that_from_the_run_left_alone(panda):
 
 
 @pytest.mark.slow
-def test_moving_and_holding_arms_are_bridged_and_braked(panda, monkeypatch):
+def test_arms_that_move_and_rest_are_bridged_and_braked(panda, monkeypatch):
     chosen = [case for case in CASES if case.name in ("tick 20 ms late", "frozen for 20 ms", "frozen for 300 ms")]
     monkeypatch.setattr(clock, "CASES", chosen)
     for module in (clock, clock_tables):

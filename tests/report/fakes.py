@@ -141,7 +141,7 @@ def task_safety():
 def disturbance():
     rng = np.random.default_rng(3)
     found, recordings = [], []
-    for mode in ("holding", "wiping"):
+    for mode in ("at rest", "wiping"):
         for link in (4, 5, 6):
             scenario = f"push on link {link} while {mode}"
             found += trials(

@@ -21,7 +21,7 @@ from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import Obstacle
 from contactsafe.sim.world import Worlds
 
-SITUATIONS = ("moving", "holding", "sliding", "in contact")
+SITUATIONS = ("moving", "at rest", "sliding", "in contact")
 """What the arm may be doing: in free air, on a surface, or pressed by an obstacle."""
 
 _CONTACT_S = 0.3  # after the obstacle would be met
@@ -109,7 +109,7 @@ def sample_scene(arm: Arm, situation: str, seed: int) -> Scene:
     """Sample a scene of one of `SITUATIONS`; it depends on its seed alone."""
     fits = {
         "moving": lambda motion: not motion.holds and not motion.slides,
-        "holding": lambda motion: motion.holds and not motion.slides,
+        "at rest": lambda motion: motion.holds and not motion.slides,
         "sliding": lambda motion: not motion.holds and motion.slides,
         "in contact": lambda motion: not motion.holds,
     }[situation]

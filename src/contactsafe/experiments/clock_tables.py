@@ -29,11 +29,11 @@ def clock_tables(trials: Sequence[Trial], controllers: Sequence[str], cases: Seq
 
 
 _AWAY = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool away, mm: moving", "holding", "sliding",
+    "what happens", "time", "false contact, ms", "torque step, N m", "tool away, mm: moving", "at rest", "sliding",
     "in contact", "contact force, N", "undisturbed, N",
 )  # fmt: skip
 _TRAVEL = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool travels, mm: moving", "holding", "sliding",
+    "what happens", "time", "false contact, ms", "torque step, N m", "tool travels, mm: moving", "at rest", "sliding",
     "in contact", "joint speed left, rad/s", "fault", "step when reset, N m",
 )  # fmt: skip
 

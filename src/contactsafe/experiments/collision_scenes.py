@@ -19,8 +19,8 @@ from contactsafe.robot.shape import link_frames
 from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
 
-LEAD_M = 0.05
-"""How far a policy's x_d may lead the tool."""
+TARGET_OFFSET_MAX_M = 0.05
+"""Largest distance of a policy's x_d from the tool, m."""
 
 SURFACE_CENTRE = BoardConfig().centre
 """Of the level surface that the tool slides on, world, m."""
@@ -48,7 +48,7 @@ class Motion:
         start: tool pose at first.
         path: from start to end, world, m; zeros to hold.
         speed_m_s: of x_d along it.
-        limited: x_d leads the tool by `LEAD_M` at most, as a policy's does.
+        limited: x_d stays within `TARGET_OFFSET_MAX_M` of the tool, as a policy's does.
         stiffness: K1, (6,), 1/s².
         q_start: joint positions, (n,), rad.
         meets_at: fraction of the path at which the obstacle is met.

@@ -228,7 +228,7 @@ def scene_metrics(motion: Motion, meetings: tuple[Meeting, ...]) -> dict[str, fl
         "obstacle_stiffness_n_m": _FIXED_N_M if stiffest.obstacle.fixed else stiffest.obstacle.stiffness,
         "obstacle_mass_kg": stiffest.obstacle.mass,
         "speed_m_s": 0.0 if motion.holds else motion.speed_m_s,
-        "lead_limited": float(motion.limited),
+        "target_offset_limited": float(motion.limited),
     }
 
 

@@ -100,12 +100,12 @@ def _alarm_table(by_name: Mapping[str, list[Trial]]) -> Table:
     rows = []
     for name, trials in by_name.items():
         watched = [trial.metrics for trial in trials if trial.scenario in (FREE, SLIDING)]
-        minutes, alarms, lasted_s, touched = (
+        minutes, entries, lasted_s, touched = (
             sum(metrics[figure] for metrics in watched)
             for figure in ("minutes", "false_alarms", "false_contact_s", "touched")
         )
-        an_hour = 60.0 * alarms / minutes if minutes else math.nan
-        rows.append((name, minutes, int(alarms), an_hour, lasted_s, int(touched)))
+        an_hour = 60.0 * entries / minutes if minutes else math.nan
+        rows.append((name, minutes, int(entries), an_hour, lasted_s, int(touched)))
     columns = (
         "controller",
         "minutes watched",

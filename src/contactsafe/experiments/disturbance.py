@@ -27,6 +27,7 @@ DURATION_S = 2.5
 PUSH_POINTS = {4: (-0.0825, 0.12, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
 """Where each link is pushed: end of the forearm near the elbow, its middle, the wrist; in the link's frame, m."""
 
+AT_REST = "at rest"
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 """K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
 
@@ -39,7 +40,7 @@ METRICS = (
     Metric("error_end_mm", "tool error at the end of the push", "mm"),
     Metric("error_after_mm", "tool error after the push", "mm"),
 )  # fmt: skip
-HIGHLIGHTS = (Highlight("push on link 5 while holding", "error_max_mm", "Tool error under a push on the forearm"),)
+HIGHLIGHTS = (Highlight("push on link 5 while at rest", "error_max_mm", "Tool error under a push on the forearm"),)
 
 
 def during_push(run: Recording) -> np.ndarray:
@@ -90,7 +91,7 @@ ENTRY = Entry(
 
 def modes(task: ExperimentTask) -> tuple[str, str]:
     """Return what the tool does while the arm is pushed."""
-    return ("holding", task.name)
+    return (AT_REST, task.name)
 
 
 def push_force(seed: int, link: int) -> np.ndarray:

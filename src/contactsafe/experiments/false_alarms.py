@@ -56,13 +56,13 @@ def false_alarm_trials(arm: Arm, name: str, controller: ControllerConfig, stroke
     worlds = Worlds(arm, [stroke.world((), real=True) for stroke in strokes], controller, n, seeds)
     play, steps = Playback(worlds, strokes), np.zeros((n, MAX_TICKS), dtype=trace_dtype(arm.n))
     mode, untouched = np.zeros((n, 1), int), np.ones(n, bool)
-    alarms, lasting, watched = np.zeros(n), np.zeros(n), np.zeros(n)
+    entries, lasting, watched = np.zeros(n), np.zeros(n), np.zeros(n)
     while play.running.any():
         ticks = play.step(steps)
         now = steps[:, :ticks]
         untouched &= np.abs(now["tau_arm"]).max(axis=(1, 2)) <= _TOUCHED_NM
         modes = np.concatenate([mode, now["mode"]], axis=1)
-        alarms += untouched * np.count_nonzero(np.diff(modes) > 0, axis=1)
+        entries += untouched * np.count_nonzero(np.diff(modes) > 0, axis=1)
         lasting += untouched * (now["mode"] == 1).sum(axis=1)
         watched += untouched * ticks
         mode = modes[:, -1:]
@@ -73,7 +73,7 @@ def false_alarm_trials(arm: Arm, name: str, controller: ControllerConfig, stroke
             name,
             stroke.seed,
             {
-                "false_alarms": float(alarms[i]),
+                "false_alarms": float(entries[i]),
                 "false_contact_s": float(lasting[i]) / 1000.0,
                 "minutes": float(watched[i]) / 60000.0,
                 "touched": float(not untouched[i]),

@@ -56,7 +56,7 @@ def _ticks(controller: np.record, n: int) -> None:
 def measure_speed(task: ExperimentTask, bundle: Bundle, progress: Callable[[int], object] | None = None) -> list[Speed]:
     """Time bare physics, physics with the tick, the tick, the task's parts, the policy and the episodes, in turns.
 
-    Parts of one thread are timed by the processor time they take, so that others on the machine weigh less; the
+    Parts of one thread are timed by the processor time they take, so that other load on the machine counts less; the
     episodes, whose threads divide the cores between them, by the clock on the wall.
 
     Args:

@@ -1,4 +1,4 @@
-"""Figures as HTML: cards with bars, tables with spreads, sentences about what was missed."""
+"""Figures as HTML: cards, tables with spreads, sentences about what was missed."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ def coloured(controller: str) -> str:
 
 
 def cards(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
-    """Return the highlights as cards: the last controller's middle, and those of all as bars."""
+    """Return the highlights as cards: the last controller's middle, and those of all beside each other."""
     return "\n".join(_card(line, label, names) for label, line in rows.highlights(experiments))
 
 
@@ -26,10 +26,10 @@ def _card(line: Line, label: str, names: Sequence[str]) -> str:
     unit, scale = line.metric.unit, line.metric.scale
     middles = {name: scale * line.values[name].middle if name in line.values else math.nan for name in names}
     most = max((value for value in middles.values() if math.isfinite(value)), default=0.0)
-    bars = []
+    meters = []
     for name, value in middles.items():
         width = 100 * value / most if math.isfinite(value) and most > 0 else 0.0
-        bars.append(
+        meters.append(
             f'<span class="name" {coloured(name)}>{escape(name)}</span>'
             f'<i style="--c: var({data.css_variable(name)}); width: {width:.1f}%"></i>'
             f"<b>{data.number(value)} {unit}</b>"
@@ -39,7 +39,7 @@ def _card(line: Line, label: str, names: Sequence[str]) -> str:
         f'<div class="card"><h3>{escape(label)}</h3>'
         f'<p class="big" {coloured(subject)}>{data.number(middles[subject])} '
         f"<small>{unit}, {escape(subject)}</small></p>"
-        f'<div class="bars">{"".join(bars)}</div></div>'
+        f'<div class="meters">{"".join(meters)}</div></div>'
     )
 
 

@@ -1,10 +1,12 @@
 """The wiping task as the experiments see it: boards to wipe, a lure beside an obstacle, strokes under pushes."""
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from contactsafe.core.copying import Independent
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.policy.observation import ACTION_SIZE
@@ -34,7 +36,7 @@ Begin = Callable[[WipingTasks, int, np.random.Generator], None]
 """Begins one task's episode from its generator."""
 
 
-class WipingEpisodes:
+class WipingEpisodes(Independent):
     """Held-out boards, one a seed; see `contactsafe.experiments.task.Episodes`.
 
     Args:
@@ -154,7 +156,7 @@ class Wiping:
         tasks = WipingTasks(WipingConfig(controller=controller, action=action), len(seeds), list(seeds), worlds)
         x, y, z = tasks.config.world.board.centre
         start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
-        episodes = WipingEpisodes(tasks, seeds, lambda tasks, i, rng: tasks.reset(i, rng, start=start))
+        episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))
         return episodes, strokes(action) if works else _nothing
 
     def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
