@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "howto" / "collisions.md").read_text(encoding="utf-8")
 SNIPPET = re.compile(r"<!-- runnable -->\n```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
-METRICS = re.compile(r"^\| ((?:`\w+`(?:, )?)+) \|", re.MULTILINE)
+METRICS = re.compile(r"^((?:`\w+`(?:, )?)+)$", re.MULTILINE)
 
 
 def test_snippet_runs_and_every_column_is_explained(tmp_path):
