@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.control import presets
-from contactsafe.results.figures import Figure, Panel
+from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage, level_rectangle
 from contactsafe.robot import robots
@@ -80,7 +80,7 @@ class Reaching:
     policy = "A policy reaches."
     metrics = (Metric("away_mm", "distance reached", "mm", main=True, aim=Aim(at_least=1000 * GOAL_M)),)
     highlights = (Highlight("reaching", "away_mm", "Distance reached"),)
-    figures = (Figure(((Panel("distance", "m", lambda run: run.curves["away"]),),), "Reaching."),)
+    panels = (Panel("distance", "m", lambda run: run.curves["away"]),)
     stage = Stage(PANDA, WIPING_PAD, level_rectangle((0.5, 0.0, 0.01), (0.5, 0.6)), {1: (200, 0, 0)})
 
     def episodes(self, controller, seeds):

@@ -34,7 +34,8 @@ def test_task_safety_reports_the_tasks_metrics_beside_its_own(task_result):
     assert names[0] == "away_mm"
     assert "tool_force_peak_n" in names
     assert task_result.highlights[0] == TASK.highlights[0]
-    assert task_result.figures[0] == TASK.figures[0]
+    assert task_result.figures[0].plots[-1] == TASK.panels
+    assert task_result.figures[0].caption.endswith("range; distance.")
     assert (task_result.stage, task_result.policy) == (TASK.stage, TASK.policy)
 
 

@@ -134,7 +134,7 @@ def task_safety():
     recordings = tuple(record("wiping", name, 8.0) for name in CONTROLLERS)
     return Experiment(
         "task-safety", "Task safety", "Does the tool press gently?", tuple(found), (*Wiping.metrics, *task.METRICS),
-        Wiping.highlights, recordings, (*Wiping.figures, task.IMPEDANCE), Wiping.stage, policy=Wiping.policy,
+        Wiping.highlights, recordings, (task.curves(Wiping.panels), task.IMPEDANCE), Wiping.stage, policy=Wiping.policy,
     )  # fmt: skip
 
 

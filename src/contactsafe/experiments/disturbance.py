@@ -81,7 +81,16 @@ def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> E
                         recordings.append(pushed.recording(0, scenario, name, config.seed))
                     if progress:
                         progress(len(seeds))
-    return Experiment(NAME, "Disturbance", QUESTION, tuple(trials), METRICS, HIGHLIGHTS, tuple(recordings), (CURVES,))
+    return Experiment(
+        NAME,
+        "Disturbance",
+        QUESTION,
+        trials=tuple(trials),
+        metrics=METRICS,
+        highlights=HIGHLIGHTS,
+        recordings=tuple(recordings),
+        figures=(CURVES,),
+    )
 
 
 ENTRY = Entry(

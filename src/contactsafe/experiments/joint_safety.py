@@ -77,9 +77,17 @@ def joint_safety(config: ExperimentConfig, progress: Progress | None = None) -> 
         recordings += worth_showing(runs)
     task = config.the_task()
     return Experiment(
-        NAME, "Joint safety", QUESTION, tuple(trials), METRICS, HIGHLIGHTS, tuple(recordings), (CURVES,), task.stage,
+        NAME,
+        "Joint safety",
+        QUESTION,
+        trials=tuple(trials),
+        metrics=METRICS,
+        highlights=HIGHLIGHTS,
+        recordings=tuple(recordings),
+        figures=(CURVES,),
+        stage=task.stage,
         policy=task.policy,
-    )  # fmt: skip
+    )
 
 
 ENTRY = Entry(

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from contactsafe.results.figures import Figure
+from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Highlight, Metric
 from contactsafe.results.recording import Stage
 from contactsafe.robot.arm import Arm
@@ -90,7 +90,7 @@ class ExperimentTask(Protocol):
         policy: what the learned policy does, in a sentence.
         metrics: of an episode's outcome.
         highlights: of them, for scenarios named `name`.
-        figures: of its curves.
+        panels: of its curves, plotted beside the tool's force.
         stage: on which it is filmed.
     """
 
@@ -98,7 +98,7 @@ class ExperimentTask(Protocol):
     policy: str
     metrics: tuple[Metric, ...]
     highlights: tuple[Highlight, ...]
-    figures: tuple[Figure, ...]
+    panels: tuple[Panel, ...]
     stage: Stage
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> Episodes:

@@ -1,5 +1,7 @@
 """Task safety: the policy works on held-out episodes; how strongly does the tool press, and does it work as well?"""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
@@ -78,10 +80,17 @@ def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> E
         if fullest is not None:
             recordings.append(fullest)
     return Experiment(
-        NAME, "Task safety", QUESTION, tuple(trials), (*task.metrics, *METRICS),
-        (*task.highlights, Highlight(task.name, "tool_force_peak_n", "Peak force of the tool")),
-        tuple(recordings), (*task.figures, IMPEDANCE), task.stage, policy=task.policy,
-    )  # fmt: skip
+        NAME,
+        "Task safety",
+        QUESTION,
+        trials=tuple(trials),
+        metrics=(*task.metrics, *METRICS),
+        highlights=(*task.highlights, Highlight(task.name, "tool_force_peak_n", "Peak force of the tool")),
+        recordings=tuple(recordings),
+        figures=(curves(task.panels), IMPEDANCE),
+        stage=task.stage,
+        policy=task.policy,
+    )
 
 
 ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, needs_policy=True)
@@ -106,6 +115,15 @@ def force_metrics(trace: np.ndarray) -> dict[str, float]:
         "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
         "contact_mode_fraction": float(trace["mode"].mean()),
     }
+
+
+def curves(of_task: Sequence[Panel]) -> Figure:
+    """Return the figure of the tool's force and of the task's own curves."""
+    labels = "".join(f"; {panel.label}" for panel in of_task)
+    return Figure(
+        plots=tuple((panel,) for panel in (*FORCES, *of_task)),
+        caption=f"Force on the tool along the world's axes, mean and, pale, range{labels}.",
+    )
 
 
 def landing_peak(force: np.ndarray, touching: np.ndarray) -> float:

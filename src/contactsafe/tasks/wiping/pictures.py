@@ -1,6 +1,6 @@
 """How the wiping task is shown: its metrics, its curve, and the stage of its films."""
 
-from contactsafe.results.figures import Figure, Panel, component
+from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage, level_rectangle
 from contactsafe.robot.panda import PANDA, WIPING_PAD
@@ -25,13 +25,7 @@ METRICS = (
 )
 HIGHLIGHTS = (Highlight(NAME, "ink_removed", "Ink wiped off boards never seen before"),)
 
-FORCES = Figure(
-    plots=(
-        *((Panel(f"tool force, {axis}", "N", component("tool_force", i), noisy=True),) for i, axis in enumerate("xyz")),
-        (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),),
-    ),
-    caption="Force of the board on the tool along the world's axes, mean and, pale, range; ink left.",
-)
+PANELS = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
 _BOARD = BoardConfig()
 STAGE = Stage(

@@ -10,7 +10,7 @@ from contactsafe.core.copying import Independent
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.policy.observation import ACTION_SIZE
-from contactsafe.results.figures import Figure
+from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Highlight, Metric
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.camera import render_mask_into
@@ -126,7 +126,7 @@ class Wiping:
     policy = pictures.POLICY
     metrics: tuple[Metric, ...] = pictures.METRICS
     highlights: tuple[Highlight, ...] = pictures.HIGHLIGHTS
-    figures: tuple[Figure, ...] = (pictures.FORCES,)
+    panels: tuple[Panel, ...] = pictures.PANELS
     stage = pictures.STAGE
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
