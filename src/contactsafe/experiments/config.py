@@ -72,7 +72,7 @@ class ExperimentConfig:
         """Return the number of trials: of each controller and seed so many scenarios."""
         return self.trials * len(self.controllers) * scenarios
 
-    def the_task(self) -> ExperimentTask:
+    def require_task(self) -> ExperimentTask:
         """Return the task.
 
         Raises:
@@ -82,7 +82,7 @@ class ExperimentConfig:
             raise InvalidInputError("this experiment runs a task, and none is given; give ExperimentConfig(task=...)")
         return self.task
 
-    def the_bundle(self) -> Bundle:
+    def require_bundle(self) -> Bundle:
         """Return the policy bundle.
 
         Raises:

@@ -63,7 +63,7 @@ def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> E
         config: controllers, seeds and task.
         progress: told of every trial done.
     """
-    task = config.the_task()
+    task = config.require_task()
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for mode in modes(task):

@@ -75,7 +75,7 @@ def joint_safety(config: ExperimentConfig, progress: Progress | None = None) -> 
                 if progress:
                     progress(len(seeds))
         recordings += worth_showing(runs)
-    task = config.the_task()
+    task = config.require_task()
     return Experiment(
         NAME,
         "Joint safety",
@@ -107,10 +107,10 @@ def worth_showing(runs: Mapping[int, list[Recording]]) -> list[Recording]:
 
 def _collide(config: ExperimentConfig, scenario: str, controller: str, seeds: Sequence[int]) -> list[Recording]:
     make = OBSTACLES[scenario]
-    episodes = config.the_task().towards_obstacle(
+    episodes = config.require_task().towards_obstacle(
         controller, seeds, lambda arm, q: make(place_before_forearm(arm, q, make))
     )
-    run = run_policy(episodes, policy_for(config.the_bundle(), episodes).act, steps_in(DURATION_S))
+    run = run_policy(episodes, policy_for(config.require_bundle(), episodes).act, steps_in(DURATION_S))
     obstacle = episodes.worlds.configs[0].obstacles[0]
     episodes.worlds.close()
     shape = (obstacle.radius, obstacle.half_length)

@@ -59,7 +59,7 @@ def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> E
         config: controllers, seeds, task and policy bundle.
         progress: told of every trial done.
     """
-    task, bundle = config.the_task(), config.the_bundle()
+    task, bundle = config.require_task(), config.require_bundle()
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for name in config.controllers:
