@@ -5,8 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from contactsafe.results.experiment import Experiment, Table, Trial, to_json
+from contactsafe.results.metrics import Highlight, Metric
 from contactsafe.results.spread import spread
 
 NAN = float("nan")
@@ -78,3 +81,50 @@ def test_evaluation_of_a_policy_that_cleaned_nothing_is_still_json():
     assert json.loads(text, parse_constant=pytest.fail) == {
         "time_s": None, "boards": [{"time_s": None, "push_s": [0.5, None]}],
     }  # fmt: skip
+
+
+scenarios = st.sampled_from(["bottle", "thrust meter"])
+trials = st.lists(
+    st.builds(
+        Trial,
+        scenario=scenarios,
+        controller=st.sampled_from(["vices", "safe"]),
+        seed=st.integers(0, 9),
+        metrics=st.fixed_dictionaries({"force_n": st.floats(0, 100), "time_s": st.just(NAN)}),
+        plant=st.sampled_from(["", "real", "clean"]),
+    ),
+    max_size=30,
+)
+
+
+@given(trials)
+def test_every_trial_is_in_one_spread(found):
+    spreads = Experiment("x", "X", "?", tuple(found)).spreads()
+    counted = sum(row["force_n"].n for rows in spreads.values() for row in rows.values())
+    assert counted == len(found)
+    assert set(spreads) == {trial.heading for trial in found}
+    assert all(row["time_s"].n == 0 for rows in spreads.values() for row in rows.values())
+
+
+@given(trials)
+def test_an_experiment_is_strict_json_whatever_it_measured(found):
+    read = json.loads(to_json(Experiment("x", "X", "?", tuple(found)).as_dict()), parse_constant=pytest.fail)
+    assert len(read["trials"]) == len(found)
+
+
+@pytest.mark.parametrize(("plant", "heading"), [("", "bottle"), ("real", "bottle, real plant")])
+def test_a_plant_is_part_of_the_heading(plant, heading):
+    assert Trial("bottle", "safe", 0, {}, plant).heading == heading
+
+
+def test_declarations_go_along():
+    metric = Metric("force_n", "force", "N", main=True)
+    written = Experiment("x", "The x", "Why?", (), (metric,), (Highlight("bottle", "force_n", "Force"),)).as_dict()
+    assert (written["title"], written["question"]) == ("The x", "Why?")
+    assert written["metrics"] == {"force_n": metric.as_dict()}
+    assert written["highlights"] == [{"scenario": "bottle", "metric": "force_n", "label": "Force"}]
+
+
+@given(st.floats(-1e6, 1e6))
+def test_numbers_keep_six_digits(value):
+    assert json.loads(to_json({"value": value}))["value"] == pytest.approx(value, rel=1e-5, abs=1e-300)
