@@ -283,9 +283,9 @@ def checkpoints(seed: int, items: range):
     from contactsafe.learning.train_policy import encoded
     from contactsafe.learning.train_vae import VaeConfig, train_vae
     from contactsafe.learning.vision_encoder import VisionEncoder
-    from contactsafe.sim.randomisation import Randomisation
     from contactsafe.tasks.base.pushes import Pushes
     from contactsafe.tasks.wiping.config import WipingConfig
+    from contactsafe.tasks.wiping.randomisation import Randomisation
 
     def make_env():
         task = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes(), episode_s=1.0)

@@ -23,12 +23,12 @@ from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
-from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
-from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
-from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.sim.stepping import run_ticks, tool_position
 from contactsafe.tasks import WIPING
+from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
+from contactsafe.tasks.wiping.randomisation import Randomisation
 
 ROLLOUTS = 6
 

@@ -17,15 +17,18 @@ import numpy as np
 
 import contactsafe as cs
 from contactsafe.control.laws import contact_nullspace, push_along, stiffness_wrench, task_inertia, task_nullspace
-from contactsafe.experiments.collision_scenes import clearance, description_and_tool, sample_meetings, sample_motion
+from contactsafe.experiments.adversarial import run_adversarial
+from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
 from contactsafe.experiments.collisions import run_battery
-from contactsafe.experiments.detection import CONTACT, alarm_trials, paint_strokes, point_torque, sample_push
 from contactsafe.experiments.disturbance import PUSH_POINTS
-from contactsafe.experiments.hostile import run_hostile
+from contactsafe.experiments.false_alarms import false_alarm_trials, sample_strokes
 from contactsafe.experiments.motions import Playback, record
+from contactsafe.experiments.pushes import CONTACT, point_torque, sample_push
+from contactsafe.experiments.surfaces import clearance, description_and_tool
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.shape import link_frames
-from contactsafe.sim.config import NO_NOISE, Obstacle, PlantConfig, WorldConfig
+from contactsafe.sim.config import NO_NOISE, PlantConfig, WorldConfig
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
@@ -286,14 +289,14 @@ def bounded_push() -> None:
 
 def _battery(laws: dict[str, cs.ControllerConfig], trials: int) -> None:
     result = run_battery(laws, range(trials), ["clean"])
-    harder = next(row for row in result.tables[0].rows if str(row[0]).startswith("trials harder"))
-    for name, count in zip(laws, harder[2:], strict=True):
+    regressions = next(row for row in result.tables[0].rows if str(row[0]).startswith("peak regressions"))
+    for name, count in zip(laws, regressions[2:], strict=True):
         peak, steady = (
             [trial.metrics[figure] for trial in result.trials if trial.controller == name]
             for figure in ("contact_peak_n", "contact_steady_n")
         )
         line = f"peak {shares(peak, 'N'):22s} steady {shares(steady, 'N'):20s}"
-        say(f"{name:14s} {line} harder than vices in {count:.0f} of {trials}")
+        say(f"{name:14s} {line} peak regressions: {count:.0f} of {trials}")
 
 
 def yield_or_hold() -> None:
@@ -539,10 +542,10 @@ def weight_of_the_links() -> None:
     heavy = replace(ARM, model=mujoco.MjModel.from_xml_string(_arm_mjcf(mass=1.1)))
     off = np.median([np.abs(model_at(q, heavy).g - model_at(q).g) for q in postures(100)], axis=0)
     say(f"links 10 % heavier: {', '.join(f'{nm:.1f}' for nm in off)} N m at joints 1 to 7, median of 100 postures")
-    strokes = paint_strokes(ARM, 0, 6)
+    strokes = sample_strokes(ARM, 0, 6)
     laws = {"paper": PAPER, "safe, not weighing": replace(SAFE, mass_uncertainty=0.0), "safe": SAFE}
     for name, config in laws.items():
-        found = [trial.metrics for trial in alarm_trials(ARM, name, config, strokes)]
+        found = [trial.metrics for trial in false_alarm_trials(ARM, name, config, strokes)]
         alarms, lasted = sum(f["false_alarms"] for f in found), sum(f["false_contact_s"] for f in found)
         minutes = sum(f["minutes"] for f in found)
         counted = f"{alarms:.0f} false contacts, {lasted:.0f} s of them"
@@ -594,9 +597,9 @@ def pull_and_energy() -> None:
     }
     laws = {"paper": PAPER, "+ tank": replace(PAPER, **tank), "+ bounded pull": replace(PAPER, **pull), "safe": SAFE}
     for name, config in laws.items():
-        found = run_hostile(ARM, config, range(8), 5000)
+        found = run_adversarial(ARM, config, range(8), 5000)
         given, beyond = (max(f[figure] for f in found) for figure in ("energy_given_j", "joint_range_beyond_mrad"))
-        say(f"{name:14s} 8 hostile policies of 5 s: at most {given:3.0f} J given away (a tank's bound: "
+        say(f"{name:14s} 8 adversarial runs of 5 s: at most {given:3.0f} J given away (a tank's bound: "
             f"{SAFE.tank_j + 5 * SAFE.tank_power_w:.0f} J), {beyond:3.0f} mrad out of range")  # fmt: skip
 
 

@@ -18,9 +18,9 @@ from contactsafe.core.parse import parse
 from contactsafe.experiments.config import PLANTS
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.sim.drawings import BOARDS
 from contactsafe.tasks import ENGINES, TASKS
 from contactsafe.tasks.wiping.config import ImageSource
+from contactsafe.tasks.wiping.drawings import BOARDS
 from contactsafe.tasks.wiping.figures import FIGURES
 from contactsafe.tasks.wiping.scripted import SCRIPTED
 
@@ -154,7 +154,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         (
             "experiment dancing",
             "'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, detection, "
-            "hostile, clock; see contactsafe experiment --help",
+            "adversarial, clock; see contactsafe experiment --help",
         ),
         ("experiment disturbance --controllers safe,best", UNKNOWN.format("controllers", "experiment")),
         ("demo --controllers best", UNKNOWN.format("controllers", "demo")),
@@ -327,7 +327,7 @@ def test_collisions_need_no_bundle_and_leave_page_summary_and_a_row_a_trial(tmp_
     words = "experiment collisions --trials 2 --controllers vices,safe --seed 4 --out"
     assert main([*words.split(), str(tmp_path)]) == 0
     out, err = capsys.readouterr()
-    assert "trials harder than vices" in out
+    assert "peak regressions against vices" in out
     assert "--trials 1 --out trial-4 --seed 4" in out
     assert "4/4" not in err
     assert "8/8" in err

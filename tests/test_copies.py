@@ -17,6 +17,7 @@ import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
+from contactsafe.tasks.wiping.env import WipingEnv
 
 import contactsafe as cs
 from contactsafe.control.records import controller_dtype
@@ -25,21 +26,20 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
-from contactsafe.experiments.run import Run
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
-from contactsafe.tasks.wiping.randomisation import Randomisation
-from contactsafe.tasks.wiping.whiteboard import Whiteboard
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.env import WipingEnv
+from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.tasks.wiping.scenes import Wiping
 from contactsafe.tasks.wiping.scripted import NearestInk, RandomPolicy, Raster
 from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.tasks.wiping.whiteboard import Whiteboard
 
 VARIED = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes())
 RNG = np.random.default_rng(0)
@@ -95,6 +95,11 @@ def run_tasks(tasks):
     step = int(tasks.tasks["steps"][0])
     tasks.step(ACTIONS[step, : tasks.worlds.n])
     return [*tasks.observation().values(), tasks.reward, tasks.worlds.plants["q_seen"].copy()]
+
+
+def run_episodes(episodes):
+    episodes.step(np.full((episodes.worlds.n, 18), 0.3))
+    return [episodes.observation()["pose"], episodes.curves()["ink_left"], episodes.pictures()]
 
 
 def step_env(env):
@@ -297,7 +302,8 @@ ACTORS = {
     "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
     "RandomPolicy": (lambda: RandomPolicy(2, 0), lambda r: [r.act(observation())]),
     "Threads": (begun(lambda: Threads(2), share), share),
-    "Run": (lambda: Run([np.zeros(3)], np.zeros(1), [True], np.zeros((1, 1)), 12), lambda r: r.traces),
+    "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
+    "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Plotter": (plotter, lambda p: [p._count]),
 }
 """How each is made in the midst of what it does, and what it does next, as arrays."""

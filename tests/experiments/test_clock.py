@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from contactsafe.control import presets
-from contactsafe.experiments import clock
-from contactsafe.experiments.clock import CASES, SITUATIONS, Case, clock_metrics, draw_scene
+from contactsafe.experiments import clock, clock_tables
+from contactsafe.experiments.clock import clock_metrics
+from contactsafe.experiments.clock_cases import CASES, SITUATIONS, Case, Scene, sample_scene
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.late_worlds import FROZEN, LOST, NO_CALL, SEEN, LateWorlds
 from contactsafe.robot import robots
@@ -64,7 +65,7 @@ def test_deviation_is_that_from_the_run_left_alone(panda):
     trace["position"][60:, 1] = 0.003
     trace["mode"][70:80] = 1
     trace["torque"][50:, 2] = 0.5
-    scene = clock.Scene(None, (), 0, 40)
+    scene = Scene(None, (), 0, 40)
     found = clock_metrics(trace, calm, scene, CASES[0])
     assert found["tool_away_mm"] == pytest.approx(3.0)
     assert found["false_contact_ms"] == 10
@@ -76,13 +77,14 @@ def test_deviation_is_that_from_the_run_left_alone(panda):
 
 
 @pytest.mark.slow
-def test_moving_and_holding_arms_are_bridged_and_braked(panda, monkeypatch):
+def test_arms_that_move_and_rest_are_bridged_and_braked(panda, monkeypatch):
     chosen = [case for case in CASES if case.name in ("tick 20 ms late", "frozen for 20 ms", "frozen for 300 ms")]
     monkeypatch.setattr(clock, "CASES", chosen)
-    monkeypatch.setattr(clock, "SITUATIONS", SITUATIONS[:2])
+    for module in (clock, clock_tables):
+        monkeypatch.setattr(module, "SITUATIONS", SITUATIONS[:2])
     told: list[int] = []
     config = ExperimentConfig(("safe",), trials=2, seed=3)
-    found = clock.clock(None, config, told.append)
+    found = clock.clock(config, told.append)
     assert sum(told) == len(found.trials) == clock.count(config)
     assert [len(table.rows) for table in found.tables] == [4, 2]
     for trial in found.trials:
@@ -93,6 +95,6 @@ def test_moving_and_holding_arms_are_bridged_and_braked(panda, monkeypatch):
 
 
 def test_a_scene_depends_on_its_seed_alone(panda):
-    scenes = [draw_scene(panda, "moving", seed) for seed in (4, 5, 4)]
+    scenes = [sample_scene(panda, "moving", seed) for seed in (4, 5, 4)]
     assert scenes[0].motion.seed == scenes[2].motion.seed != scenes[1].motion.seed
     assert not scenes[0].motion.holds

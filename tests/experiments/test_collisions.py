@@ -13,7 +13,7 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.motions import record
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.robot import robots
-from contactsafe.sim.config import Obstacle
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import Worlds
 
@@ -22,7 +22,7 @@ TWO = {"vices": presets.vices(), "safe": presets.safe()}
 
 @pytest.fixture(scope="module")
 def battery():
-    """Seeds of sweeps and holds, in the air and wiping, one and two obstacles."""
+    """Seeds of sweeps and holds, in the air and on a surface, one and two obstacles."""
     return run_battery(TWO, range(6))
 
 
@@ -87,7 +87,7 @@ def test_seeds_of_several_batches_come_in_order(monkeypatch):
 def test_progress_adds_up_to_what_was_announced():
     config = ExperimentConfig(("safe",), trials=2, plants=("clean",))
     done = []
-    collisions(None, config, done.append)
+    collisions(config, done.append)
     assert sum(done) == ENTRIES["collisions"].count(config) == 2
 
 

@@ -8,22 +8,18 @@ from numpy.testing import assert_allclose
 
 from contactsafe import presets
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments import detection as subject
+from contactsafe.experiments import false_alarms
 from contactsafe.experiments.collision_scenes import sample_motion
 from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.detection import (
+from contactsafe.experiments.detection import detection, reporting
+from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_trials, sample_strokes
+from contactsafe.experiments.pushes import (
     CONTACT,
-    FREE,
     LINKS,
     STEP,
-    WIPING,
     Push,
-    alarm_trials,
     contact_metrics,
-    detection,
-    paint_strokes,
     push_trials,
-    reporting,
     sample_push,
     step_metrics,
 )
@@ -94,18 +90,18 @@ def test_a_pushed_scene_does_the_same_alone_and_among_others():
     assert {trial.scenario for trial in among} == {STEP}
 
 
-def test_strokes_go_to_and_fro_on_the_way_no_faster_than_their_speed():
-    stroke = paint_strokes(ARM, 0, 1)[0]
+def test_strokes_go_to_and_fro_on_their_path_no_faster_than_their_speed():
+    stroke = sample_strokes(ARM, 0, 1)[0]
     places = np.array([stroke.target(time_s) for time_s in np.arange(0.0, 20.0, 0.001)])
-    share = (places - stroke.start.position) @ stroke.way / stroke.length_m**2
-    assert share.min() == 0.0
-    assert share.max() == pytest.approx(1.0, abs=1e-4)
+    fraction = (places - stroke.start.position) @ stroke.path / stroke.length_m**2
+    assert fraction.min() == 0.0
+    assert fraction.max() == pytest.approx(1.0, abs=1e-4)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=1).max() / 0.001
     assert speed == pytest.approx(stroke.speed_m_s, rel=1e-3)
 
 
 def test_strokes_leave_holds_out():
-    strokes = paint_strokes(ARM, 0, 8)
+    strokes = sample_strokes(ARM, 0, 8)
     holds = [seed for seed in range(strokes[-1].seed) if sample_motion(ARM, seed).holds]
     assert holds
     assert not {stroke.seed for stroke in strokes} & set(holds)
@@ -113,14 +109,14 @@ def test_strokes_leave_holds_out():
 
 @pytest.fixture
 def short(monkeypatch):
-    monkeypatch.setattr(subject, "STROKES_S", 1.0)
+    monkeypatch.setattr(false_alarms, "STROKES_S", 1.0)
 
 
 @pytest.mark.usefixtures("short")
 def test_a_controller_that_is_never_sure_gives_false_alarms():
-    strokes = paint_strokes(ARM, 0, 2)
-    (first, _) = alarm_trials(ARM, "nervous", replace(presets.safe(), residual_threshold=0.05), strokes)
-    (calm, _) = alarm_trials(ARM, "calm", replace(presets.safe(), residual_threshold=50.0), strokes)
+    strokes = sample_strokes(ARM, 0, 2)
+    (first, _) = false_alarm_trials(ARM, "nervous", replace(presets.safe(), residual_threshold=0.05), strokes)
+    (calm, _) = false_alarm_trials(ARM, "calm", replace(presets.safe(), residual_threshold=50.0), strokes)
     assert first.metrics["false_alarms"] >= 1.0
     assert first.metrics["false_contact_s"] > 0.5
     assert calm.metrics == {"false_alarms": 0.0, "false_contact_s": 0.0, "minutes": 1 / 60, "touched": 0.0}
@@ -130,10 +126,10 @@ def test_a_controller_that_is_never_sure_gives_false_alarms():
 def test_the_experiment_counts_its_trials_and_sums_up():
     config = ExperimentConfig(("vices", "safe"), trials=3, minutes=0.05)
     done = []
-    result = detection(None, config, done.append)
+    result = detection(config, done.append)
     assert sum(done) == ENTRIES["detection"].count(config) == len(result.trials) == 3 + 3 + 3
     assert {trial.controller for trial in result.trials} == {"safe"}
-    assert set(result.spreads()) <= {STEP, CONTACT, FREE, WIPING}
+    assert set(result.spreads()) <= {STEP, CONTACT, FREE, SLIDING}
     alarms, links = result.tables
     assert alarms.as_records()[0]["minutes watched"] == pytest.approx(0.05)
     kept = [t for t in result.trials if t.scenario == CONTACT and not t.metrics["reported_early"]]

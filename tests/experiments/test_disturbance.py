@@ -1,17 +1,22 @@
 """The disturbance experiment, one seed: the same again for the same seed, and contact safety holds the tool better."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.disturbance import MODES, PUSH_POINTS, disturbance
+from contactsafe.experiments.disturbance import PUSH_POINTS, disturbance, modes
+from contactsafe.tasks.wiping.scenes import Wiping
 
-ONE = ExperimentConfig(("vices", "safe"), trials=1, seed=0)
+TASK = Wiping()
+MODES = modes(TASK)
+ONE = ExperimentConfig(("vices", "safe"), trials=1, seed=0, task=TASK)
 
 
 @pytest.fixture(scope="module")
 def result():
-    return disturbance(None, ONE)
+    return disturbance(ONE)
 
 
 def error(result, link, mode, controller):
@@ -44,14 +49,14 @@ def test_safe_strays_a_third_as_far_as_vices(result, mode):
 
 
 def test_the_same_seed_gives_the_same_figures(result):
-    again = disturbance(None, ExperimentConfig(("safe",), trials=1, seed=0))
+    again = disturbance(replace(ONE, controllers=("safe",)))
     mine = {trial.scenario: trial.metrics for trial in result.trials if trial.controller == "safe"}
     assert {trial.scenario: trial.metrics for trial in again.trials} == mine
 
 
 def test_another_seed_pushes_from_elsewhere(result):
     told = []
-    other = disturbance(None, ExperimentConfig(("safe",), trials=1, seed=1), told.append)
+    other = disturbance(replace(ONE, controllers=("safe",), seed=1), told.append)
     assert sum(told) == len(other.trials)
     first = next(t for t in result.trials if t.controller == "safe")
     assert other.trials[0].metrics["error_max_mm"] != first.metrics["error_max_mm"]

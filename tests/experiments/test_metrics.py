@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from contactsafe.experiments.disturbance import PUSH_N, PUSH_POINTS, PUSH_S, deviation_metrics, push_force
-from contactsafe.experiments.joint_safety import _worth_showing, contact_metrics
-from contactsafe.experiments.results import Recording
-from contactsafe.experiments.task_safety import wiping_metrics
+from contactsafe.experiments.joint_safety import contact_metrics, worth_showing
+from contactsafe.experiments.task_safety import force_metrics
+from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
 
 
@@ -18,33 +18,29 @@ def trace(ticks):
     return made
 
 
-def test_wiping_counts_force_only_while_the_pad_touches():
+def test_force_counts_only_while_the_tool_touches():
     run = trace(1000)
     run["tool_force"][500:, 2] = 6.0
     run["tool_force"][500:600, 0] = 8.0
-    run["ink_left"] = 0.25
     run["mode"][900:] = 1
     run["K_task"][:500, 2], run["K_task"][500:, 2] = 80.0, 200.0
-    metrics = wiping_metrics(run, clean=False)
-    assert metrics["ink_removed"] == 0.75
+    metrics = force_metrics(run)
     assert metrics["tool_force_median_n"] == 6.0
     assert metrics["tool_force_peak_n"] == metrics["tool_force_p95_n"] == 10.0
     assert metrics["landing_peak_n"] == 10.0
     assert (metrics["stiffness_z_free"], metrics["stiffness_z_contact"]) == (80.0, 200.0)
     assert metrics["contact_mode_fraction"] == 0.1
-    assert math.isnan(metrics["time_s"])
-    assert wiping_metrics(run, clean=True)["time_s"] == 0.999
 
 
 def test_a_tool_that_never_touched_has_no_force_of_contact():
-    metrics = wiping_metrics(trace(10), clean=False)
+    metrics = force_metrics(trace(10))
     assert metrics["tool_force_peak_n"] == 0.0
     assert math.isnan(metrics["tool_force_median_n"])
     assert math.isnan(metrics["landing_peak_n"])
 
 
 def collision():
-    """Nothing for 1 s, a blow of 80 N for 20 ms, 20 N from there on; found after 15 ms."""
+    """Nothing for 1 s, an impact of 80 N for 20 ms, 20 N from there on; detected after 15 ms."""
     run = trace(4000)
     run["obstacle_force"][1000:1020], run["obstacle_force"][1020:] = 80.0, 20.0
     run["tau_arm"][1000:1020, 2], run["tau_arm"][1020:, 3] = -30.0, 7.0
@@ -55,7 +51,7 @@ def collision():
     return run
 
 
-def test_a_collision_has_a_peak_a_steady_part_and_a_time_to_be_found():
+def test_a_collision_has_a_peak_a_steady_part_and_a_time_to_its_detection():
     metrics = contact_metrics(collision())
     assert metrics == {
         "met": 1.0,
@@ -72,7 +68,7 @@ def test_a_collision_has_a_peak_a_steady_part_and_a_time_to_be_found():
     }
 
 
-def test_a_collision_that_was_never_found_has_no_time():
+def test_a_collision_that_was_never_detected_has_no_time():
     run = collision()
     run["link"] = 0
     assert math.isnan(contact_metrics(run)["detect_ms"])
@@ -116,8 +112,8 @@ def test_shown_is_the_first_seed_with_which_every_arm_met_the_obstacle():
     def run(seed, force):
         made = trace(5)
         made["obstacle_force"][2] = force
-        return Recording("bottle", "safe", seed, made, np.zeros((1, 2, 2), np.uint8), 200)
+        return Recording("bottle", "safe", seed, made)
 
     runs = {4: [run(4, 9.0), run(4, 0.0)], 5: [run(5, 9.0), run(5, 9.0)], 6: [run(6, 9.0), run(6, 9.0)]}
-    assert [recording.seed for recording in _worth_showing(runs)] == [5, 5]
-    assert [recording.seed for recording in _worth_showing({4: runs[4]})] == [4, 4]
+    assert [recording.seed for recording in worth_showing(runs)] == [5, 5]
+    assert [recording.seed for recording in worth_showing({4: runs[4]})] == [4, 4]

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.experiments.joint_safety import _HIT_AT, contact_metrics, forearm, held_before_forearm
+from contactsafe.experiments.joint_safety import contact_metrics, forearm, place_before_forearm
 from contactsafe.experiments.run import run_policy
 from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.shape import arm_capsules
-from contactsafe.sim.config import WorldConfig, bottle, thrust_meter
+from contactsafe.sim.obstacles import bottle, thrust_meter
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.scenes import OBSTACLE_AT, Wiping, meeting_posture
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 SEEDS = range(4)
@@ -32,6 +33,10 @@ def distance_to_arm(tasks, q, point):
     return min(gaps)
 
 
+def place(tasks, make, seed):
+    return place_before_forearm(tasks.arm, meeting_posture(tasks, np.random.default_rng(seed)), make)
+
+
 def over(tasks, y):
     x, _, z = tasks.config.world.board.centre
     return tasks.posture_over(Pose(np.array([x, y, z]), DOWN))
@@ -40,17 +45,17 @@ def over(tasks, y):
 @pytest.mark.parametrize("make", [bottle, thrust_meter])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_forearm_reaches_it_on_its_way_right_and_not_before(probe, make, seed):
-    place = np.array(held_before_forearm(probe, make, np.random.default_rng(seed)))
+    centre = np.array(place(probe, make, seed))
     radius = make((0, 0, 0)).radius
-    gaps = np.array([distance_to_arm(probe, over(probe, y), place) for y in np.linspace(0.1, -0.2, 31)]) - radius
+    gaps = np.array([distance_to_arm(probe, over(probe, y), centre) for y in np.linspace(0.1, -0.2, 31)]) - radius
     assert gaps[0] > 0.03
     assert gaps.min() < -0.005
     met_at = np.linspace(0.1, -0.2, 31)[int(np.argmax(gaps <= 0))]
-    assert _HIT_AT[0] - 0.02 <= met_at <= _HIT_AT[1] + 0.02
+    assert OBSTACLE_AT[0] - 0.02 <= met_at <= OBSTACLE_AT[1] + 0.02
 
 
 def test_the_place_is_its_seeds(probe):
-    places = [held_before_forearm(probe, bottle, np.random.default_rng(seed)) for seed in (1, 1, 2)]
+    places = [place(probe, bottle, seed) for seed in (1, 1, 2)]
     assert places[0] == places[1]
     assert places[0] != places[2]
 
@@ -65,12 +70,8 @@ def test_forearm_is_the_thickest_capsule_of_link_5(probe):
 
 @pytest.mark.parametrize("make", [bottle, thrust_meter])
 def test_led_to_the_right_every_seed_meets_it(probe, make):
-    rngs = [np.random.default_rng(seed) for seed in SEEDS]
-    worlds = [WorldConfig(obstacles=(make(held_before_forearm(probe, make, rng)),)) for rng in rngs]
-    tasks = WipingTasks(WipingConfig(controller="vices"), len(SEEDS), 0, worlds)
-    for i, rng in enumerate(rngs):
-        tasks.reset(i, rng)
-        assert tasks.worlds.reports["obstacle_force_peak"][i] == 0.0
+    episodes = Wiping().towards_obstacle("vices", SEEDS, lambda arm, q: make(place_before_forearm(arm, q, make)))
+    assert (episodes.worlds.reports["obstacle_force_peak"] == 0.0).all()
 
     def to_the_right(observation):
         action = np.zeros((len(SEEDS), 18))
@@ -78,8 +79,8 @@ def test_led_to_the_right_every_seed_meets_it(probe, make):
         action[:, 2] = np.where(observation["pose"][:, 2] > 0.015, -1.0, 0.0)
         return action
 
-    run = run_policy(tasks, to_the_right, 180, stop_when_clean=False)
-    tasks.worlds.close()
+    run = run_policy(episodes, to_the_right, 180)
+    episodes.worlds.close()
     for trace in run.traces:
         metrics = contact_metrics(trace)
         assert metrics["met"] == 1.0

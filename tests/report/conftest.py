@@ -25,7 +25,7 @@ def experiments(fakes):
 @pytest.fixture(scope="session")
 def folder(fakes, experiments, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    write_report(folder, experiments, fakes.FACTS)
+    write_report(folder, experiments, fakes.INFO)
     return folder
 
 

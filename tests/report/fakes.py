@@ -2,13 +2,18 @@
 
 import numpy as np
 
-from contactsafe.experiments.results import Experiment, Recording, Trial
+from contactsafe.experiments import disturbance as pushes
+from contactsafe.experiments import joint_safety as joint
+from contactsafe.experiments import task_safety as task
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
+from contactsafe.tasks.wiping.scenes import Wiping
 
 CONTROLLERS = ("vices", "paper", "safe")
 STEADY_N = {"vices": 60.0, "paper": 33.0, "safe": 9.0}
 ERROR_MM = {"vices": 32.0, "paper": 18.0, "safe": 4.0}
-BOARD_EVERY = 200
+PICTURE_EVERY = 200
 REACHED = np.array(  # postures with the tool over the board, from its middle to its right, rad
     [
         [0.043, 0.436, -0.036, -2.372, 0.046, 2.807, 0.752],
@@ -19,10 +24,10 @@ REACHED = np.array(  # postures with the tool over the board, from its middle to
 
 
 def moving(times, knots, stop=1.0):
-    """Interpolate joint positions, (T, 7), through the reached postures, smoothly, up to a share of the way."""
-    share = stop * np.clip((times - 1.0) / knots, 0.0, 1.0)
-    share = share * share * (3 - 2 * share) * (len(REACHED) - 1)
-    return np.stack([np.interp(share, range(len(REACHED)), REACHED[:, i]) for i in range(7)], axis=1)
+    """Interpolate joint positions, (T, 7), through the reached postures, smoothly, up to a fraction of their path."""
+    fraction = stop * np.clip((times - 1.0) / knots, 0.0, 1.0)
+    fraction = fraction * fraction * (3 - 2 * fraction) * (len(REACHED) - 1)
+    return np.stack([np.interp(fraction, range(len(REACHED)), REACHED[:, i]) for i in range(7)], axis=1)
 
 
 def touch(times, start, peak, steady):
@@ -44,7 +49,6 @@ def trace(rng, duration_s, controller, obstacle=None):
     rows["tool_force"][:, 2] = force
     rows["tool_force"][:, 0] = 0.3 * force * np.cos(2 * times)
     rows["tool_force"][:, 1] = 0.3 * force * np.sin(2 * times)
-    rows["ink_left"] = np.repeat(np.clip(1.1 - times[::17] / duration_s, 0.0, 1.0), 17)[: len(times)]
     if obstacle is not None:
         position, stiffness = obstacle
         steady = STEADY_N[controller]
@@ -63,7 +67,7 @@ def boards(rng, duration_s, dark_object):
     x, y = np.meshgrid(np.arange(250), np.arange(300), indexing="ij")
     wave = np.abs(x - 125 - 40 * np.sin(y / 20 + rng.uniform(0, 6))) < 4
     ink = (wave & (np.abs(y - 150) < 70)) | ((x - 90) ** 2 + (y - 190) ** 2 < 80)
-    for i in range(1 + round(1000 * duration_s) // BOARD_EVERY):
+    for i in range(1 + round(1000 * duration_s) // PICTURE_EVERY):
         board = (ink & (y < 225 - 4 * i)).astype(np.uint8)
         if dark_object:
             board[100:150, 15:45] = 2
@@ -74,7 +78,9 @@ def boards(rng, duration_s, dark_object):
 def record(scenario, controller, duration_s, obstacle=None, shape=None):
     rng = np.random.default_rng([len(scenario), CONTROLLERS.index(controller)])
     rows = trace(rng, duration_s, controller, obstacle)
-    return Recording(scenario, controller, 0, rows, boards(rng, duration_s, shape is not None), BOARD_EVERY, shape)
+    left = np.repeat(np.clip(1.1 - rows["time"][::17] / duration_s, 0.0, 1.0), 17)[: len(rows)]
+    pictures = boards(rng, duration_s, shape is not None)
+    return Recording(scenario, controller, 0, rows, shape, pictures, PICTURE_EVERY, {"ink_left": left})
 
 
 def trials(rng, scenario, figures, seeds=10):
@@ -106,7 +112,10 @@ def joint_safety():
         )
         recordings += [record(scenario, name, 6.0, obstacle, shape) for name in CONTROLLERS]
     found = [Trial(t.scenario, t.controller, t.seed, t.metrics | {"met": 1.0}) for t in found]
-    return Experiment("joint-safety", "How hard is the contact?", tuple(found), tuple(recordings))
+    return Experiment(
+        "joint-safety", "Joint safety", "What are the forces?", tuple(found), joint.METRICS, joint.HIGHLIGHTS,
+        tuple(recordings), (joint.CURVES,), Wiping.stage, policy=Wiping.policy,
+    )  # fmt: skip
 
 
 def task_safety():
@@ -123,13 +132,16 @@ def task_safety():
         },
     )
     recordings = tuple(record("wiping", name, 8.0) for name in CONTROLLERS)
-    return Experiment("task-safety", "Does the tool press gently?", tuple(found), recordings)
+    return Experiment(
+        "task-safety", "Task safety", "Does the tool press gently?", tuple(found), (*Wiping.metrics, *task.METRICS),
+        Wiping.highlights, recordings, (task.curves(Wiping.panels), task.IMPEDANCE), Wiping.stage, policy=Wiping.policy,
+    )  # fmt: skip
 
 
 def disturbance():
     rng = np.random.default_rng(3)
     found, recordings = [], []
-    for mode in ("holding", "wiping"):
+    for mode in ("at rest", "wiping"):
         for link in (4, 5, 6):
             scenario = f"push on link {link} while {mode}"
             found += trials(
@@ -145,18 +157,20 @@ def disturbance():
                 bump = touch(recording.trace["time"], 0.5, 1.2, 1.0) * (recording.trace["time"] < 2.0)
                 recording.trace["error"][:, :3] = 0.001 * ERROR_MM[name] * bump[:, None] * (0.6, -1.0, 0.3)
                 recordings.append(recording)
-    return Experiment("disturbance", "How far does the tool stray?", tuple(found), tuple(recordings))
+    return Experiment(
+        "disturbance", "Disturbance", "How far does the tool stray?", tuple(found), pushes.METRICS, pushes.HIGHLIGHTS,
+        tuple(recordings), (pushes.CURVES,),
+    )  # fmt: skip
 
 
 def everything():
     return (task_safety(), joint_safety(), disturbance())
 
 
-FACTS = {
+INFO = {
     "version": "0.1.0",
     "when": "2026-01-02T03:04:05+00:00",
     "seeds": list(range(10)),
     "bundle_sha256": "0123456789abcdef" * 4,
     "command": "contactsafe demo --trials 10",
-    "push_s": (0.5, 2.0),
 }

@@ -1,6 +1,7 @@
 """report.html: whole, alone, and true to the figures it was made from."""
 
 import base64
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -9,9 +10,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from contactsafe.experiments.results import Experiment, Table, Trial
+from contactsafe.experiments.collisions import CURVES
 from contactsafe.report import write_report
 from contactsafe.report.film import FORCE_UNIT, Q_UNIT
+from contactsafe.results.experiment import Experiment, Table, Trial
+from contactsafe.results.metrics import Metric
 
 VOID = {"meta", "link", "input", "br", "hr", "img"}
 
@@ -38,7 +41,7 @@ class Page(HTMLParser):
         if "id" in values:
             self.ids.append(values["id"])
         if "data-figure" in values:
-            self.figures[values["data-figure"]] = values.get("data-median")
+            self.figures[values["data-figure"]] = values.get("data-value")
         self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "srcset", "action")]
 
     def handle_data(self, data):
@@ -115,9 +118,9 @@ def test_headline_shows_the_medians(page, experiments):
 
 def test_page_says_where_paper_falls_short(page, experiments):
     metrics = {name: row["contact_steady_n"].median for name, row in experiments[1].spreads()["bottle"].items()}
-    share = metrics["paper"] / metrics["vices"]
+    multiple = metrics["paper"] / metrics["vices"]
     assert (
-        f"bottle: contact force, steady is {metrics['paper']:.1f} N, {share:.2f} of the {metrics['vices']:.1f} N of "
+        f"bottle: contact force, steady is {metrics['paper']:.1f} N, {multiple:.2f} of the {metrics['vices']:.1f} N of "
         "vices; the aim is at most 1/3 of vices." in page
     )
     assert "</strong> misses 6 of 6 aims:" in page
@@ -129,8 +132,9 @@ def test_page_says_where_all_aims_are_reached(page):
 
 
 def test_stiffness_and_damping_are_drawn_against_contact_for_one_controller(page):
-    figure = page[: page.index("What the policy does with its impedance, under safe")].rpartition("<figure>")[2]
-    for label in ("stiffness K1 towards the board", "damping D1 towards", "stiffness K1 along the board", "damping D1"):
+    caption = page.index("What the policy does with its impedance. Shaded: contact, above 0.5 N. Under safe, seed 0.")
+    figure = page[:caption].rpartition("<figure>")[2]
+    for label in ("stiffness K1 along z", "damping D1 along z", "stiffness K1 along x", "damping D1 along x"):
         assert label in figure
     assert "var(--band)" in figure
     assert "--c-vices" not in figure
@@ -174,25 +178,29 @@ def test_film_holds_the_recordings(page, experiments):
             assert values[:, 10].max() * FORCE_UNIT == pytest.approx(
                 recording.trace["obstacle_force"].max(), abs=FORCE_UNIT
             )
-            np.testing.assert_array_equal(boards_of(run), recording.boards)
+            np.testing.assert_array_equal(pictures_of(run), recording.pictures)
 
 
 def ticks(frames):
     return np.round(np.arange(frames) * 1000 / 60).astype(int)
 
 
-def boards_of(run):
-    """Decode as film.js does: clean from frame code − 2 on, 1 the object, 65535 ink that stays."""
-    runs = np.frombuffer(base64.b64decode(run["ink"]), "<u2").reshape(-1, 2)
-    codes = np.repeat(runs[:, 0], runs[:, 1]).reshape(run["cells"])
-    frames = np.arange(31)[:, None, None]
-    ink = (codes > 1) & ((codes == 65535) | (frames < codes.astype(int) - 2))
-    return np.where(codes == 1, 2, ink)
+def pictures_of(run):
+    """Decode as film.js does: each picture follows the last; 0 leaves a cell as it was, another code is value + 1."""
+    runs = np.frombuffer(base64.b64decode(run["pictures"]), "<u2").reshape(-1, 2)
+    codes = np.repeat(runs[:, 0], runs[:, 1]).reshape(-1, *run["cells"])
+    for before, now in itertools.pairwise(codes := codes.copy()):
+        now[now == 0] = before[now == 0]
+    return codes - 1
 
 
 def test_names_are_escaped(fakes, tmp_path):
     trials = (Trial("<b>&", "vices", 0, {"depth_mm": 1.5}), Trial("<b>&", "<i>x", 0, {"depth_mm": float("nan")}))
-    path = write_report(tmp_path, [Experiment("<odd>", "Is 1 < 2?", trials)], {"command": "contactsafe <demo>"})
+    path = write_report(
+        tmp_path,
+        [Experiment("<odd>", "<Odd>", "Is 1 < 2?", trials, (Metric("depth_mm", "<depth>", "mm"),))],
+        {"command": "contactsafe <demo>"},
+    )
     parsed = Page(path.read_text(encoding="utf-8"))
     assert parsed.faults == []
     assert parsed.figures == {"<odd>/<b>&/vices/depth_mm": "1.5", "<odd>/<b>&/<i>x/depth_mm": None}
@@ -213,12 +221,13 @@ def test_own_tables_and_the_trial_over_time_are_shown(fakes, tmp_path):
         fakes.record("sweep, real plant", name, 3.0, ((0.3, -0.2, 0.4), 2e3)) for name in ("vices", "safe")
     )
     table = Table("worst", "The <worst>", ("seed", "replay"), ((17, "again --seed 17"),), "Look.")
-    found = Experiment("collisions", "How hard?", fakes.task_safety().trials, recordings, (table,))
+    collisions = Experiment("collisions", "Collisions", "?", fakes.task_safety().trials, figures=(CURVES,))
+    found = replace(collisions, recordings=recordings, tables=(table,))
     page = write_report(tmp_path, [found], {}).read_text(encoding="utf-8")
     assert Page(page).faults == []
     assert "The &lt;worst&gt;" in page
     assert "again --seed 17" in page
-    for label in ("contact force (N)", "mode: 0 free", "tool away from its free motion (mm)"):
+    for label in ("contact force (N)", "mode: 0 free, 1 comply", "tool away from its free motion (mm)"):
         assert label in page
     assert (tmp_path / "collisions.csv").exists()
 

@@ -8,10 +8,10 @@ import pytest
 
 import contactsafe
 from contactsafe.core.errors import OutputError
-from contactsafe.experiments.results import Experiment, Table, Trial
 from contactsafe.report import prepare_output, terminal_table, write_report, write_summary
 from contactsafe.report.output import write_whole
 from contactsafe.report.summary import trials_csv
+from contactsafe.results.experiment import Experiment, Table, Trial
 
 
 def strict(text):
@@ -25,7 +25,7 @@ def test_summary_is_strict_json_with_every_spread(folder, fakes, experiments):
     summary = strict((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["version"] == contactsafe.__version__
     for key in ("when", "seeds", "bundle_sha256", "command"):
-        assert summary[key] == fakes.FACTS[key]
+        assert summary[key] == fakes.INFO[key]
     assert set(summary["versions"]) >= {"python", "numpy", "mujoco"}
     assert summary["experiments"] == {experiment.name: experiment.as_dict() for experiment in experiments}
     assert summary["experiments"]["task-safety"]["spread"]["wiping"]["paper"]["time_s"]["median"] is None
@@ -35,7 +35,7 @@ def test_folder_that_is_a_file_is_refused(tmp_path, fakes, experiments):
     taken = tmp_path / "results"
     taken.write_text("mine")
     expected = rf"^cannot write to {taken}: file exists; give a folder you may write to with --out$"
-    for act in (lambda: prepare_output(taken), lambda: write_report(taken, experiments, fakes.FACTS)):
+    for act in (lambda: prepare_output(taken), lambda: write_report(taken, experiments, fakes.INFO)):
         with pytest.raises(OutputError, match=expected):
             act()
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
@@ -95,8 +95,8 @@ def test_terminal_table_shows_medians_spreads_ratios_and_aims(experiments):
     spread = experiments[1].spreads()["bottle"]
     cells = [spread[name]["contact_steady_n"] for name in ("vices", "paper", "safe")]
     words = [word for cell in cells for word in (f"{cell.median:.3g}", f"[{cell.p5:.3g},", f"{cell.p95:.3g}]")]
-    share = cells[2].median / cells[0].median
-    expected = f"contact force, steady N {' '.join(words)} {share:.2f} at most 1/3 of vices ok"
+    multiple = cells[2].median / cells[0].median
+    expected = f"contact force, steady N {' '.join(words)} {multiple:.2f} at most 1/3 of vices ok"
     assert " ".join(block.split()) == expected
 
 
@@ -117,7 +117,7 @@ def test_csv_has_a_row_a_trial_and_is_empty_where_nothing_is():
         Trial("hold, pushed", "safe", 3, {"peak_n": 0.1 + 0.2, "detect_ms": float("nan")}, "real"),
         Trial("sweep", "vices", 3, {"peak_n": 2.0, "only_n": 1.0}),
     )
-    assert trials_csv(Experiment("collisions", "?", trials)).splitlines() == [
+    assert trials_csv(Experiment("collisions", "Collisions", "?", trials)).splitlines() == [
         "seed,scenario,controller,plant,peak_n,detect_ms,only_n",
         '3,"hold, pushed",safe,real,0.30000000000000004,,',
         "3,sweep,vices,,2.0,,1.0",
@@ -128,7 +128,7 @@ def test_own_tables_follow_in_the_terminal():
     table = Table(
         "worst", "The worst – of all", ("seed", "words", "peak (N)"), ((3, "so", 4.5), (12, "what", float("nan")))
     )
-    text = terminal_table([Experiment("collisions", "?", (), (), (table,))])
+    text = terminal_table([Experiment("collisions", "Collisions", "?", tables=(table,))])
     assert text.isascii()
     assert text.split("\n\n")[1].splitlines() == [
         "The worst - of all",

@@ -109,7 +109,9 @@ def test_sensors_and_motors_have_the_same_errors_in_every_backend(sensors):
 def test_encoders_and_filtered_velocity_are_the_same_in_every_backend():
     readings = []
     for backend in (None, NominalBackend):
-        worlds = worlds_at(START, WorldConfig(sensors=replace(REAL_SENSORS, torque_nm=0.0, force_n=0.0)), backend=backend)
+        worlds = worlds_at(
+            START, WorldConfig(sensors=replace(REAL_SENSORS, torque_nm=0.0, force_n=0.0)), backend=backend
+        )
         aim(worlds, GOAL)
         run(worlds, 200)
         readings.append(worlds.controllers[0]["measurement"]["qd"].copy())

@@ -236,7 +236,9 @@ def test_one_scale_is_the_same_for_every_link_and_one_each_is_each_links_own():
 def test_friction_of_each_joint_has_its_own_scale():
     scales = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
     plain, scaled = (
-        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=s), sensors=NO_NOISE)).records[0]["errors"]["friction"]
+        worlds_at(OVER, WorldConfig(plant=PlantConfig(friction_scale=s), sensors=NO_NOISE)).records[0]["errors"][
+            "friction"
+        ]
         for s in (1.0, scales)
     )
     assert_array_equal(plain, panda().friction)
@@ -259,8 +261,7 @@ def test_a_lighter_tool_weighs_less_and_shows_so_at_the_wrist():
         ({"inertia_scale": (1.0, 1.1)}, "inertia_scale has 2 numbers; give one, or one for each of 7 joints"),
         (
             {"payload_kg": -0.83},
-            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiping pad'; "
-            "give a larger one",
+            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiping pad'; give a larger one",
         ),
     ],
 )

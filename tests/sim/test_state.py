@@ -42,7 +42,7 @@ def course():
     begin(worlds)
     state = worlds.state_dict()
     trace = run(worlds, 120)
-    yield worlds, snapshot, trace
+    yield worlds, state, trace
     worlds.close()
 
 
@@ -55,17 +55,17 @@ def test_the_course_has_what_could_be_forgotten(course):
 
 
 def test_the_same_worlds_go_on_alike(course):
-    worlds, snapshot, trace = course
+    worlds, state, trace = course
     run(worlds, 30)
     worlds.load_state_dict(state)
     assert_same(run(worlds, 120), trace)
 
 
 def test_new_worlds_go_on_alike(course):
-    _, snapshot, trace = course
+    _, state, trace = course
     fresh = busy_worlds(99)
     addresses = fresh.records["plant"]["data"].copy(), fresh.controllers["handle"].copy()
-    fresh.load_state_dict(snapshot)
+    fresh.load_state_dict(state)
     assert_same(run(fresh, 120), trace)
     assert_array_equal(fresh.records["plant"]["data"], addresses[0])
     assert_same(fresh.controllers["handle"], addresses[1])
@@ -73,7 +73,7 @@ def test_new_worlds_go_on_alike(course):
 
 
 def test_new_worlds_draw_the_same_bias_at_their_next_reset(course):
-    _, snapshot, _ = course
+    _, state, _ = course
     biases = []
     for _ in range(2):
         worlds = busy_worlds(None)
@@ -86,7 +86,7 @@ def test_new_worlds_draw_the_same_bias_at_their_next_reset(course):
 
 
 def test_a_snapshot_is_plain_and_does_not_change(course):
-    worlds, snapshot, _ = course
+    worlds, state, _ = course
 
     def assert_plain(value):
         if isinstance(value, dict | list):
@@ -97,23 +97,23 @@ def test_a_snapshot_is_plain_and_does_not_change(course):
         else:
             assert isinstance(value, int | str)
 
-    assert_plain(snapshot)
-    assert not any(f"plant.{name}" in snapshot["records"] for name in ("data", "model", "qpos", "qpos_spring"))
-    assert "handle.data" not in snapshot["controllers"]
-    ticks = snapshot["records"]["tick"].copy()
+    assert_plain(state)
+    assert not any(f"plant.{name}" in state["records"] for name in ("data", "model", "qpos", "qpos_spring"))
+    assert "handle.data" not in state["controllers"]
+    ticks = state["records"]["tick"].copy()
     run(worlds, 5)
-    assert_array_equal(snapshot["records"]["tick"], ticks)
+    assert_array_equal(state["records"]["tick"], ticks)
 
 
 def test_a_snapshot_of_something_else_is_refused(course):
-    worlds, snapshot, _ = course
+    worlds, state, _ = course
     with pytest.raises(
-        InvalidInputError, match=r"^the snapshot holds noise, not controllers, metrics, noise, .*; start anew$"
+        InvalidInputError, match=r"^the state holds noise, not controllers, metrics, noise, .*; start anew$"
     ):
-        worlds.load_state_dict({"noise": snapshot["noise"]})
+        worlds.load_state_dict({"noise": state["noise"]})
     with pytest.raises(InvalidInputError) as error:
-        worlds.load_state_dict({**snapshot, "metrics": {**snapshot["metrics"], "ticks": np.zeros(3, dtype=np.int64)}})
-    assert str(error.value) == "the snapshot holds an array (3,) for one of (2,); start anew"
+        worlds.load_state_dict({**state, "metrics": {**state["metrics"], "ticks": np.zeros(3, dtype=np.int64)}})
+    assert str(error.value) == "the state holds an array (3,) for one of (2,); start anew"
 
 
 @pytest.mark.parametrize(
@@ -128,12 +128,12 @@ def test_a_snapshot_of_something_else_is_refused(course):
     ],
 )
 def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, part, field, value):
-    worlds, snapshot, _ = course
-    corrupt = {**snapshot, part: {name: array.copy() for name, array in snapshot[part].items()}}
-    corrupt["metrics"] = {name: np.zeros_like(array) for name, array in snapshot["metrics"].items()}
+    worlds, state, _ = course
+    corrupt = {**state, part: {name: array.copy() for name, array in state[part].items()}}
+    corrupt["metrics"] = {name: np.zeros_like(array) for name, array in state["metrics"].items()}
     corrupt[part][field].reshape(-1)[-1] = value
     before = worlds.state_dict()
-    with pytest.raises(InvalidInputError, match=r"^the snapshot holds .* start anew$") as error:
+    with pytest.raises(InvalidInputError, match=r"^the state holds .* start anew$") as error:
         worlds.load_state_dict(corrupt)
     assert f"({part}.{field})" in str(error.value)
     after = worlds.state_dict()
@@ -142,7 +142,7 @@ def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, pa
 
 
 def test_a_random_generator_whose_state_is_an_index_is_refused(course):
-    worlds, snapshot, _ = course
+    worlds, state, _ = course
     twister = {"bit_generator": "MT19937", "state": {"key": [0] * 624, "pos": 10**9}}
     for spoilt in (twister, {"bit_generator": "seed"}, {}, {**state["noise"][0], "state": {"state": ["x"]}}):
         with pytest.raises(InvalidInputError, match="which is not the state of a random generator"):

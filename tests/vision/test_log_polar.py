@@ -10,8 +10,8 @@ from numpy.testing import assert_array_equal
 from tests.learning.fakes import BOARD, camera_homography
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.wiping.board import Camera
 from contactsafe.tasks.wiping.camera import plane_homography
-from contactsafe.sim.config import Camera
 from contactsafe.vision.log_polar import FEATURES, RINGS, SCALES_M, SECTORS, ground_of, log_polar_features
 
 H = camera_homography()

@@ -10,19 +10,29 @@ from tqdm import tqdm
 
 from contactsafe.control import presets
 from contactsafe.core.compiled import CACHE_FOLDER
-from contactsafe.core.parse import some_of
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.parse import one_of, some_of
 from contactsafe.policy.bundle import Bundle, shipped_bundle
-from contactsafe.tasks import DEFAULT_TASK
+from contactsafe.tasks import DEFAULT_TASK, TASKS
 
 COMPILES = "the first run compiles for a minute or two"
 
+TaskName = Annotated[str, one_of(TASKS)]
 Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS)]
 BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
 
 
 def load_bundle(folder: Path | None, task: str = DEFAULT_TASK) -> Bundle:
-    """Load a bundle from its folder; the one that is shipped for the task where there is no folder."""
-    return Bundle.load(folder or shipped_bundle(task))
+    """Load a bundle from its folder; the one that is shipped for the task where there is no folder.
+
+    Raises:
+        InvalidInputError: it is of another task.
+    """
+    bundle = Bundle.load(folder or shipped_bundle(task))
+    of = bundle.manifest["task"]
+    if of != task:
+        raise InvalidInputError(f"{bundle.folder} is a policy for the task {of}, not for {task}; give --task {of}")
+    return bundle
 
 
 @functools.cache

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import tyro
 
-from contactsafe.cli.common import BundleFolder, load_bundle, progress
+from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
-from contactsafe.experiments.results import to_json
 from contactsafe.policy.policy import Policy
+from contactsafe.results.experiment import to_json
 from contactsafe.tasks import DEFAULT_TASK, ENGINES, TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, figures_of
 from contactsafe.tasks.base.figures import names
@@ -34,7 +34,7 @@ class Options:
     """
 
     bundle: Annotated[BundleFolder, tyro.conf.Positional] = None
-    task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
+    task: TaskName = DEFAULT_TASK
     episodes: int = 50
     seed: int = 0
     json: bool = False
@@ -58,11 +58,6 @@ def evaluate(arguments: Sequence[str]) -> None:
     if asked.scripted is not None and asked.bundle is not None:
         raise InvalidInputError(f"a bundle and --scripted {asked.scripted} are both given; name one")
     bundle = None if asked.scripted else load_bundle(asked.bundle, described.name)
-    if bundle is not None and bundle.manifest["task"] != described.name:
-        raise InvalidInputError(
-            f"{bundle.folder} is a policy for the task {bundle.manifest['task']}, not for {described.name}; "
-            f"give --task {bundle.manifest['task']}"
-        )
     config = described.config(asked)
     most = _MOST_SIDE_BY_SIDE.get(asked.engine, 16)
     side_by_side = max(n for n in range(1, most + 1) if asked.episodes % n == 0)

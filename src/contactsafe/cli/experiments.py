@@ -4,18 +4,21 @@ import datetime
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from contactsafe.cli.common import BundleFolder, Controllers, described, load_bundle, progress
-from contactsafe.core.parse import one_of, some_of
+from contactsafe.cli.common import BundleFolder, Controllers, TaskName, described, load_bundle, progress
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.parse import docstring, one_of, some_of
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
-from contactsafe.experiments.results import Experiment, to_json
-from contactsafe.policy.bundle import Bundle
+from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.manifest import MANIFEST, digest
+from contactsafe.results.experiment import Experiment, to_json
+from contactsafe.tasks import DEFAULT_TASK, task_by_name
 
 
 def _usual_trials() -> str:
@@ -31,6 +34,7 @@ def demo(
     seed: int = 0,
     controllers: Controllers = ExperimentConfig.controllers,
     bundle: BundleFolder = None,
+    task: TaskName = DEFAULT_TASK,
 ) -> None:
     """Run the paper's three experiments and write a page about them.
 
@@ -40,16 +44,17 @@ def demo(
         seed: first seed.
         controllers: presets to compare.
         bundle: folder of another policy.
+        task: what the policy does.
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
 
-    config = ExperimentConfig(controllers, trials, seed)
-    loaded = load_bundle(bundle)
+    scenes = scenes_of(task)
+    config = ExperimentConfig(controllers, trials, seed, task=scenes, bundle=load_bundle(bundle, task))
     folder = prepare_output(out)
     started = time.monotonic()
-    results = _run(registry.PAPER, loaded, config)
-    description = _description("contactsafe demo", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, description)
+    results = _run(registry.PAPER, config)
+    info = _run_info("contactsafe demo", task, config, time.monotonic() - started)
+    page = write_report(folder, results, info)
     print(terminal_table(results))
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
 
@@ -64,16 +69,11 @@ def experiment(
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None,
     json: bool = False,
     bundle: BundleFolder = None,
+    task: TaskName = DEFAULT_TASK,
 ) -> None:
     """Run one of the experiments.
 
-      task-safety   the policy wipes boards never seen: how hard does it press?
-      joint-safety  the forearm runs into an obstacle while the policy works.
-      disturbance   somebody leans on the arm with 25 N.
-      collisions    random motions meet random obstacles anywhere on the arm.
-      detection     how soon is a contact reported, where, how often falsely?
-      hostile       a policy asks for the impossible: are all limits kept?
-      clock         ticks late, measurements lost, frozen or impossible, no policy.
+      EXPERIMENTS
 
     The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
     of any batch once more and draws it.
@@ -88,48 +88,67 @@ def experiment(
         out: folder for report.html, summary.json and the trials as NAME.csv.
         json: print tables, spreads and trials as JSON instead of text.
         bundle: folder of another policy.
+        task: what the policy does.
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
     from contactsafe.report.summary import summarise
 
     entry = registry.by_name(name)
-    config = ExperimentConfig(controllers, entry.trials if trials is None else trials, seed, plants, minutes)
-    loaded = load_bundle(bundle) if bundle or entry.needs_policy else None
+    trials = entry.trials if trials is None else trials
+    config = ExperimentConfig(controllers, trials, seed, plants, minutes, scenes_of(task))
+    if bundle or entry.needs_policy:
+        config = replace(config, bundle=load_bundle(bundle, task))
     folder = prepare_output(out) if out else None
     started = time.monotonic()
-    results = _run([name], loaded, config)
-    description = _description(f"contactsafe experiment {name}", config, loaded, time.monotonic() - started)
-    page = write_report(folder, results, description) if folder else None
-    print(to_json(summarise(results, description)) if json else terminal_table(results))
+    results = _run([name], config)
+    info = _run_info(f"contactsafe experiment {name}", task, config, time.monotonic() - started)
+    page = write_report(folder, results, info) if folder else None
+    print(to_json(summarise(results, info)) if json else terminal_table(results))
     if page:
         print(f"report: {page}", file=sys.stderr)
 
 
-def _run(names: Sequence[str], bundle: Bundle | None, config: ExperimentConfig) -> list[Experiment]:
+experiment.__doc__ = docstring(experiment).replace(
+    "  EXPERIMENTS", "\n".join(f"  {entry.name:14s}{entry.about}" for entry in registry.ENTRIES.values())
+)
+
+
+def scenes_of(task: str) -> ExperimentTask:
+    """Return what the experiments ask of a task.
+
+    Raises:
+        InvalidInputError: no task has this name, or it has nothing for them.
+    """
+    scenes = task_by_name(task).scenes
+    if scenes is None:
+        raise InvalidInputError(f"task '{task}' has no scenes for experiments; see docs/howto/own_task.md")
+    return scenes()
+
+
+def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:
     entries = {name: registry.by_name(name) for name in names}
     results = []
     with progress(names[0], sum(entry.count(config) for entry in entries.values())) as bar:
         for name, entry in entries.items():
             bar.set_description_str(described(name))
-            results.append(entry.run(bundle, config, bar.update))
+            results.append(entry.run(config, bar.update))
     return results
 
 
-def _description(command: str, config: ExperimentConfig, bundle: Bundle | None, seconds: float) -> dict:
-    from contactsafe.experiments.disturbance import PUSH_S
-
+def _run_info(command: str, task: str, config: ExperimentConfig, seconds: float) -> dict:
     words = [command, f"--trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}"]
+    if task != DEFAULT_TASK:
+        words.append(f"--task {task}")
     if config.plants != ExperimentConfig.plants:
         words.append(f"--plants {','.join(config.plants)}")
     if config.minutes != ExperimentConfig.minutes:
         words.append(f"--minutes {config.minutes:g}")
-    description = {
+    info = {
         "command": " ".join(words),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(config.seeds),
-        "push_s": PUSH_S,
         "seconds": round(seconds, 1),
     }
-    if bundle is not None:
-        description["bundle_sha256"] = digest((Path(bundle.folder) / MANIFEST).read_bytes())
-    return description
+    if config.bundle is not None:
+        info["bundle_sha256"] = digest((Path(config.bundle.folder) / MANIFEST).read_bytes())
+    return info

@@ -8,26 +8,29 @@ from typing import Annotated
 
 from tqdm import tqdm
 
-from contactsafe.cli.common import BundleFolder, load_bundle, progress
+from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress
+from contactsafe.cli.experiments import scenes_of
 from contactsafe.core.compiled import CACHE_FOLDER
 from contactsafe.core.parse import some_of
-from contactsafe.experiments.results import to_json
+from contactsafe.results.experiment import to_json
+from contactsafe.tasks import DEFAULT_TASK
 
 Joints = Annotated[tuple[str, ...], some_of(map(str, range(1, 15)))]
 
 
-def bench(json: bool = False, bundle: BundleFolder = None) -> None:
+def bench(json: bool = False, bundle: BundleFolder = None, task: TaskName = DEFAULT_TASK) -> None:
     """Time the parts on this machine, as medians and ratios to bare physics.
 
     Args:
         json: print JSON instead of a table.
         bundle: folder of another policy.
+        task: what it does.
     """
     from contactsafe.experiments.speed import ROUNDS, measure_speed
 
-    loaded = load_bundle(bundle)
+    loaded, scenes = load_bundle(bundle, task), scenes_of(task)
     with progress("rounds", ROUNDS) as bar:
-        speeds = measure_speed(loaded, bar.update)
+        speeds = measure_speed(scenes, loaded, bar.update)
     if json:
         print(to_json([asdict(speed) for speed in speeds]))
         return

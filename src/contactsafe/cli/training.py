@@ -8,8 +8,8 @@ from typing import Any
 from contactsafe.cli.common import COMPILES, first_run
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import parse
-from contactsafe.experiments.results import to_json
 from contactsafe.policy.bundle import FOLDER
+from contactsafe.results.experiment import to_json
 from contactsafe.tasks import TASKS, task_by_name
 
 KINDS = ("vae", "ppo", "sac")

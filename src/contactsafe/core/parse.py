@@ -125,7 +125,7 @@ def call(function: Callable, program: str, words: Sequence[str]) -> None:
 
 def docstring(thing: Any) -> str:
     """Return the docstring of a function or class; from its source where `python -OO` has dropped it."""
-    if sys.flags.optimize < 2:
+    if sys.flags.optimize < 2 or (inspect.isfunction(thing) and thing.__doc__):
         return inspect.getdoc(thing) or ""
     try:
         body = ast.parse(textwrap.dedent(inspect.getsource(thing))).body[0]

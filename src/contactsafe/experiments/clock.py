@@ -1,7 +1,7 @@
 """Clocks: measurements late, lost, frozen, repeated or impossible, another rate, a late policy: what then?"""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,111 +9,47 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
-from contactsafe.experiments.collision_scenes import Motion, sample_meetings, sample_motion, scene_rng
-from contactsafe.experiments.collisions import CONTACT_N
-from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.late_worlds import (
-    FROZEN,
-    LOST,
-    NO_CALL,
-    NUDGED,
-    POSITION_JUMPS,
-    SEEN,
-    VELOCITY_JUMPS,
-    LatePlayback,
-    LateWorlds,
-)
-from contactsafe.experiments.motions import record
-from contactsafe.experiments.results import Experiment, Table, Trial
-from contactsafe.experiments.run import Progress
+from contactsafe.experiments.clock_cases import CASES, SITUATIONS, Case, Scene, heading, sample_scene
+from contactsafe.experiments.clock_tables import clock_tables
+from contactsafe.experiments.collision_scenes import scene_rng
+from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.experiments.late_worlds import SEEN, LatePlayback, LateWorlds
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.metrics import CONTACT_N, ZERO, Aim, Metric
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.config import Obstacle
-from contactsafe.sim.worlds import MAX_TICKS, Worlds
+from contactsafe.sim.worlds import MAX_TICKS
 
+NAME = "clock"
 QUESTION = (
     "Ticks come late, measurements are lost, frozen, repeated or impossible, the rate is another, the policy falls "
     "silent: is a contact reported that is none, does the torque jump, does the tool stray, and is it said?"
 )
-SITUATIONS = ("moving", "holding", "wiping", "in contact")
+METRICS = (
+    Metric("false_contact_ms", "contact reported that is none", "ms", aim=ZERO),
+    Metric("torque_step_nm", "torque step, largest", "N m", aim=Aim(at_most=1.0, always=True)),
+    Metric("tool_away_mm", "tool away from the undisturbed run", "mm", aim=Aim(at_most=2.0, always=True)),
+    Metric("tool_travel_mm", "path of the tool until it rests", "mm"),
+    Metric("joint_speed_left_rad_s", "joint speed in the end", "rad/s"),
+    Metric("torque_step_back_nm", "torque step on reset, largest", "N m", aim=Aim(at_most=1.0, always=True)),
+    Metric("contact_peak_n", "contact force, peak", "N"),
+    Metric("contact_peak_calm_n", "contact force undisturbed, peak", "N"),
+)
 AFTER_S = 1.2
 """How long a trial goes on after its disturbance began, s."""
 
-_CONTACT_S = 0.3  # after the obstacle would be met
 _BACK_TICKS = 500  # after the reset that ends a trial
 
-Codes = Callable[[int, int, np.random.Generator], np.ndarray]
-"""From the ticks of a trial, the one at which something happens, and random numbers: what happens at each, (ticks,)."""
 
-
-@dataclass(frozen=True)
-class Case:
-    """One thing that may happen to a clock.
-
-    Attributes:
-        name: for readers.
-        codes: what happens when; see `LateWorlds`.
-        stops: whether it is more than may be bridged, so that the arm has to be braked.
-        silent_s: how long the policy says nothing, s.
-    """
-
-    name: str
-    codes: Codes
-    stops: bool = False
-    silent_s: float = 0.0
-
-
-def _burst(code: int, length: int) -> Codes:
-    """One disturbance of so many ticks."""
-
-    def codes(ticks: int, at: int, rng: np.random.Generator) -> np.ndarray:
-        out = np.full(ticks, SEEN)
-        out[at : at + length] = code
-        return out
-
-    return codes
-
-
-def _every(code: int, period: int, length: int) -> Codes:
-    """The same again and again: of every `period` ticks so many."""
-    return lambda ticks, at, rng: np.where(np.arange(ticks) % period >= period - length, code, SEEN)
-
-
-def _jitter(ticks: int, at: int, rng: np.random.Generator) -> np.ndarray:
-    """One to four ticks between two calls, at random."""
-    return np.where(rng.random(ticks) < 0.4, NO_CALL, SEEN)
-
-
-CASES = (
-    Case("one encoder step off, once", _burst(NUDGED, 1)),
-    *(Case(f"tick {n} ms late", _burst(NO_CALL, n)) for n in (2, 5, 10, 20)),
-    Case("jitter: four ticks in ten missed", _jitter),
-    Case("loop at 500 Hz", _every(NO_CALL, 2, 1)),
-    Case("loop at 250 Hz", _every(NO_CALL, 4, 3)),
-    *(Case(f"{n} measurement{'s' if n > 1 else ''} lost", _burst(LOST, n)) for n in (1, 5, 20)),
-    Case("10 of every 40 measurements lost", _every(LOST, 40, 10)),
-    *(Case(f"frozen for {n} ms", _burst(FROZEN, n)) for n in (5, 20)),
-    Case("every measurement twice", _every(FROZEN, 2, 1)),
-    Case("velocity 0.2 rad/s off, once", _burst(VELOCITY_JUMPS, 1)),
-    Case("position 0.05 rad off, once", _burst(POSITION_JUMPS, 1)),
-    Case("tick 40 ms late", _burst(NO_CALL, 40), stops=True),
-    Case("measurements lost for 1 s", _burst(LOST, 1000), stops=True),
-    Case("frozen for 300 ms", _burst(FROZEN, 300), stops=True),
-    Case("position 0.05 rad off, 100 ms", _burst(POSITION_JUMPS, 100), stops=True),
-    Case("policy silent for 500 ms", _burst(SEEN, 0), silent_s=0.5),
-)
-
-
-def clock(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+def clock(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
     """Run the experiment; it needs no policy.
 
     Args:
-        bundle: not used.
         config: controllers and seeds.
         progress: told of every trial done.
     """
     arm = robots.panda()
-    scenes = {situation: [draw_scene(arm, situation, seed) for seed in config.seeds] for situation in SITUATIONS}
+    scenes = {situation: [sample_scene(arm, situation, seed) for seed in config.seeds] for situation in SITUATIONS}
     trials: list[Trial] = []
     for name in config.controllers:
         controller = presets.by_name(name)
@@ -123,53 +59,19 @@ def clock(bundle, config: ExperimentConfig, progress: Progress | None = None) ->
                 traces, endings = _run(arm, controller, of_situation, case, timed)
                 for scene, trace, still, ending in zip(of_situation, traces, calm, endings, strict=True):
                     metrics = clock_metrics(trace, still, scene, case) | ending.metrics()
-                    trials.append(Trial(_heading(case, timed, situation), name, scene.seed, metrics))
+                    trials.append(Trial(heading(case, timed, situation), name, scene.seed, metrics))
                 if progress:
                     progress(len(endings))
-    return Experiment("clock", QUESTION, tuple(trials), (), tuple(_tables(trials, config.controllers)))
+    tables = tuple(clock_tables(trials, config.controllers, CASES))
+    return Experiment(NAME, "Clocks", QUESTION, tuple(trials), METRICS, tables=tables)
 
 
 def count(config: ExperimentConfig) -> int:
     """Count the trials of a configuration."""
-    return config.trials * len(config.controllers) * len(SITUATIONS) * len(CASES) * 2
+    return config.count(len(SITUATIONS) * len(CASES) * 2)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """What the arm is doing when something happens to its clock.
-
-    Attributes:
-        motion: of the tool.
-        obstacles: what it meets.
-        seed: of the sensors' noise.
-        at: tick at which it happens.
-    """
-
-    motion: Motion
-    obstacles: tuple[Obstacle, ...]
-    seed: int
-    at: int
-
-
-def draw_scene(arm: Arm, situation: str, seed: int) -> Scene:
-    """Draw a scene of one of `SITUATIONS`; it depends on its seed alone."""
-    fits = {
-        "moving": lambda motion: not motion.holds and not motion.wiping,
-        "holding": lambda motion: motion.holds and not motion.wiping,
-        "wiping": lambda motion: not motion.holds and motion.wiping,
-        "in contact": lambda motion: not motion.holds,
-    }[situation]
-    number = 1000 * seed
-    while not fits(motion := sample_motion(arm, number)):
-        number += 1
-    at = round(1000 * motion.meets_s)
-    if situation != "in contact":
-        return Scene(motion, (), seed, at)
-    worlds = Worlds(arm, motion.world((), True), presets.vices(), 1, [seed])
-    free = record(worlds, [motion])[0]
-    worlds.close()
-    met = tuple(meeting.obstacle for meeting in sample_meetings(arm, motion, free["q"]))
-    return Scene(motion, met, seed, at + round(1000 * _CONTACT_S))
+ENTRY = Entry(NAME, "ticks late, measurements lost, frozen or impossible, no policy.", clock, count=count, trials=5)
 
 
 @dataclass(frozen=True)
@@ -213,7 +115,7 @@ def _run(
 
 
 def _reset(worlds: LateWorlds, controller: ControllerConfig) -> list[float]:
-    """Reset all controllers where their arms are; give the largest torque step of each from then on, N m."""
+    """Reset all controllers where their arms are; return the largest torque step of each from then on, N m."""
     torques = [worlds.controllers["output"]["torque"].copy()]
     arm = worlds.arm
     owners = [Controller(arm, controller, worlds.controllers, i) for i in range(worlds.n)]
@@ -246,53 +148,3 @@ def clock_metrics(trace: np.ndarray, calm: np.ndarray, scene: Scene, case: Case)
         "contact_peak_calm_n": float(calm["obstacle_force"][scene.at :].max()) if touched else np.nan,
         "touching": float(calm["obstacle_force"][scene.at] > CONTACT_N) if touched else np.nan,
     }
-
-
-def _tables(trials: Sequence[Trial], controllers: Sequence[str]) -> list[Table]:
-    """Gather the worst of all seeds, one table of what is bridged and one of what is not, for each controller."""
-    tables = []
-    for name in controllers:
-        of_controller: dict[str, list[dict[str, float]]] = {}
-        for trial in trials:
-            if trial.controller == name:
-                of_controller.setdefault(trial.scenario, []).append(trial.metrics)
-        for stops, columns, metric, title in (
-            (False, _AWAY, "tool_away_mm", "bridged"), (True, _TRAVEL, "tool_travel_mm", "braked"),
-        ):  # fmt: skip
-            rows = tuple(
-                _row(of_controller, case, timed, metric, stops)
-                for case in CASES if (case.stops or case.silent_s > 0.0) == stops
-                for timed in (False, True)
-            )  # fmt: skip
-            tables.append(Table(f"{title}_{name}", f"{name}: what is {title}, the worst of all seeds", columns, rows))
-    return tables
-
-
-_AWAY = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool away, mm: moving", "holding", "wiping",
-    "in contact", "contact force, N", "undisturbed, N",
-)  # fmt: skip
-_TRAVEL = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool travels, mm: moving", "holding", "wiping",
-    "in contact", "joint speed left, rad/s", "fault", "step when reset, N m",
-)  # fmt: skip
-
-
-def _row(of_controller, case: Case, timed: bool, metric: str, stops: bool) -> tuple[str | float, ...]:
-    rows = {situation: of_controller[_heading(case, timed, situation)] for situation in SITUATIONS}
-    everything = [row for found in rows.values() for row in found]
-
-    def worst(name: str, found=None) -> float:
-        values = [row[name] for row in (everything if found is None else found) if np.isfinite(row[name])]
-        return max(values, default=np.nan)
-
-    first = (case.name, "given" if timed else "-", worst("false_contact_ms"), worst("torque_step_nm"))
-    middle = tuple(worst(metric, rows[situation]) for situation in SITUATIONS)
-    if not stops:
-        return (*first, *middle, worst("contact_peak_n"), worst("contact_peak_calm_n"))
-    faults = ", ".join(str(fault) for fault in sorted({int(row["fault"]) for row in everything}))
-    return (*first, *middle, worst("joint_speed_left_rad_s"), faults, worst("torque_step_back_nm"))
-
-
-def _heading(case: Case, timed: bool, situation: str) -> str:
-    return f"{case.name}{', time given' if timed else ''}, {situation}"

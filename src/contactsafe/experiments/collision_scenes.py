@@ -1,4 +1,4 @@
-"""Random collisions: what the arm was doing, what it met and where, and how the plant differs from its model.
+"""Random collisions: what the arm does, what it meets and where, and how the plant differs from its model.
 
 A scene depends on its seed alone. The motion is run once without obstacles; the obstacle is then placed where a random
 point of a random link will be.
@@ -10,18 +10,23 @@ from functools import cached_property
 
 import numpy as np
 
-from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
+from contactsafe.experiments.surfaces import clearance, description_and_tool, sample_surface_point
 from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Arm, Pose
-from contactsafe.robot.description import ArmDescription, Tool
+from contactsafe.robot.description import Vector3
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
-from contactsafe.robot.shape import arm_capsules, link_frames
-from contactsafe.sim.config import REAL_SENSORS, BoardConfig, Obstacle, PlantConfig, Vector3, WorldConfig
+from contactsafe.robot.shape import link_frames
+from contactsafe.sim.config import REAL_SENSORS, PlantConfig, WorldConfig
+from contactsafe.sim.fixtures import workbench
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
 
-LEAD_M = 0.05
-"""How far a policy's x_d may lead the tool."""
+TARGET_OFFSET_MAX_M = 0.05
+"""Largest distance of a policy's x_d from the tool, m."""
+
+SURFACE_CENTRE = workbench().position
+"""Of the level surface that the tool slides on, world, m."""
 
 LINKS = (2, 3, 4, 5, 6, 7, 8)
 """Links that are met; 8 is the hand."""
@@ -29,10 +34,10 @@ LINKS = (2, 3, 4, 5, 6, 7, 8)
 AFTER_S = 2.5
 """How long a trial goes on after the arm would reach the obstacle, s."""
 
-_PRESS_M = 0.004
+_PRESS_M = 0.004  # depth of x_d below the surface that the tool slides on
 _MARGIN_RAD = 0.15  # of the joint range, kept free along the path
 _CLEAR_M = 0.002
-_SKIN_S = 0.02
+_SOFT_S = 0.02  # time constant of the obstacle's surface, s
 _DEEPEST_M = 0.03  # what comes to a held arm goes no further than this into where the arm was
 
 
@@ -42,21 +47,21 @@ class Motion:
 
     Attributes:
         seed: of the scene.
-        wiping: on the board; otherwise in free air.
+        slides: pressed on the table's surface; otherwise in free air.
         start: tool pose at first.
-        way: from start to end, world, m; zeros to hold.
+        path: from start to end, world, m; zeros to hold.
         speed_m_s: of x_d along it.
-        limited: x_d leads the tool by `LEAD_M` at most, as a policy's does.
+        limited: x_d stays within `TARGET_OFFSET_MAX_M` of the tool, as a policy's does.
         stiffness: K1, (6,), 1/s².
         q_start: joint positions, (n,), rad.
-        meets_at: share of the way at which the obstacle is met.
+        meets_at: fraction of the path at which the obstacle is met.
         plant: how the arm differs from its model.
     """
 
     seed: int
-    wiping: bool
+    slides: bool
     start: Pose
-    way: np.ndarray
+    path: np.ndarray
     speed_m_s: float
     limited: bool
     stiffness: np.ndarray
@@ -66,13 +71,13 @@ class Motion:
 
     @cached_property
     def length_m(self) -> float:
-        """Length of the way, m."""
-        return float(np.linalg.norm(self.way))
+        """Length of the path, m."""
+        return float(np.linalg.norm(self.path))
 
     @cached_property
     def holds(self) -> bool:
         """Whether the tool is to stay where it is."""
-        return not self.way.any()
+        return not self.path.any()
 
     @property
     def meets_s(self) -> float:
@@ -85,14 +90,14 @@ class Motion:
         return self.meets_s + AFTER_S
 
     def target(self, time_s: float) -> np.ndarray:
-        """Give where on its way x_d is, (3,), m; it sets off after 0.2 s."""
+        """Return where on its path x_d is, (3,), m; it sets off after 0.2 s."""
         if self.holds:
             return self.start.position
-        share = min(max((time_s - 0.2) * self.speed_m_s / self.length_m, 0.0), 1.0)
-        return self.start.position + share * self.way
+        fraction = min(max((time_s - 0.2) * self.speed_m_s / self.length_m, 0.0), 1.0)
+        return self.start.position + fraction * self.path
 
     def world(self, obstacles: tuple[Obstacle, ...], real: bool) -> WorldConfig:
-        """Give the world to run it in, with the plant and sensors as they are or as the controller believes."""
+        """Return the world to run it in, with the plant and sensors as they are or as the controller believes."""
         if real:
             return WorldConfig(plant=self.plant, sensors=REAL_SENSORS, obstacles=obstacles)
         return WorldConfig(obstacles=obstacles)
@@ -112,12 +117,12 @@ class Meeting:
 
 
 def scene_rng(seed: int, part: int) -> np.random.Generator:
-    """Give the generator of one part of a scene: 0 its motion, 1 its obstacles."""
+    """Return the generator of one part of a scene: 0 its motion, 1 its obstacles."""
     return np.random.default_rng([HELD_OUT_SEED, seed, part])
 
 
 def sample_plant(rng: np.random.Generator, n: int) -> PlantConfig:
-    """Draw a plant that differs from its model: friction ± 20 % a joint, inertia ± 10 % a link, payload ± 0.2 kg."""
+    """Sample a plant that differs from its model: friction ± 20 % a joint, inertia ± 10 % a link, payload ± 0.2 kg."""
     return PlantConfig(
         friction_scale=tuple(rng.uniform(0.8, 1.2, n).tolist()),
         inertia_scale=tuple(rng.uniform(0.9, 1.1, n).tolist()),
@@ -126,45 +131,45 @@ def sample_plant(rng: np.random.Generator, n: int) -> PlantConfig:
     )
 
 
-def sample_motion(arm: Arm, seed: int, board: BoardConfig | None = None) -> Motion:
-    """Draw what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or wiping."""
-    rng, board = scene_rng(seed, 0), board or BoardConfig()
-    wiping, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
-    speed = rng.uniform(0.1, 0.3 if wiping else 0.5)
+def sample_motion(arm: Arm, seed: int) -> Motion:
+    """Sample what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or sliding."""
+    rng = scene_rng(seed, 0)
+    slides, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    speed = rng.uniform(0.1, 0.3 if slides else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)
     plant = sample_plant(rng, arm.n)
     while True:
-        pose = _sample_pose(rng, wiping, board)
-        way = np.zeros(3) if holds else _sample_path(rng, wiping)
-        postures = _reachable(arm, pose, way, wiping, rng)
+        pose = _sample_pose(rng, slides)
+        path = np.zeros(3) if holds else _sample_path(rng, slides)
+        postures = _reachable(arm, pose, path, slides, rng)
         if postures is not None:
-            return Motion(seed, wiping, pose, way, speed, limited, stiffness, postures, meets_at, plant)
+            return Motion(seed, slides, pose, path, speed, limited, stiffness, postures, meets_at, plant)
 
 
-def _sample_pose(rng: np.random.Generator, wiping: bool, board: BoardConfig) -> Pose:
-    x, y, z = board.centre
-    if wiping:
+def _sample_pose(rng: np.random.Generator, slides: bool) -> Pose:
+    x, y, z = SURFACE_CENTRE
+    if slides:
         position = np.array([x + rng.uniform(-0.15, 0.15), y + rng.uniform(-0.2, 0.2), z - _PRESS_M])
         return Pose(position, DOWN.copy())
     position = np.array([rng.uniform(0.3, 0.65), rng.uniform(-0.4, 0.4), rng.uniform(z + 0.08, 0.6)])
     return Pose(position, quat_multiply(rotvec_to_quat(rng.uniform(-0.4, 0.4, 3)), DOWN))
 
 
-def _sample_path(rng: np.random.Generator, wiping: bool) -> np.ndarray:
+def _sample_path(rng: np.random.Generator, slides: bool) -> np.ndarray:
     direction = rng.standard_normal(3)
-    if wiping:
+    if slides:
         direction[2] = 0.0
     return rng.uniform(0.2, 0.45) * direction / np.linalg.norm(direction)
 
 
-def _reachable(arm: Arm, pose: Pose, way, wiping: bool, rng) -> np.ndarray | None:
-    """Give joint positions at the start of a way that the arm can follow within its range; None if it cannot."""
-    q = arm.home + (0.0 if wiping else rng.uniform(-0.5, 0.5, arm.n))
+def _reachable(arm: Arm, pose: Pose, path: np.ndarray, slides: bool, rng: np.random.Generator) -> np.ndarray | None:
+    """Return joint positions at the start of a path that the arm can follow within its range; None if it cannot."""
+    q = arm.home + (0.0 if slides else rng.uniform(-0.5, 0.5, arm.n))
     q_start, nominal = None, arm.nominal()
-    for share in np.linspace(0.0, 1.0, 6):
-        position = pose.position + share * way
-        if position[2] < (-0.005 if wiping else 0.06) or np.linalg.norm(position[:2]) > 0.72:
+    for fraction in np.linspace(0.0, 1.0, 6):
+        position = pose.position + fraction * path
+        if position[2] < (-0.005 if slides else 0.06) or np.linalg.norm(position[:2]) > 0.72:
             return None
         seed, q = q, np.empty(arm.n)
         error, turn = solve_ik(nominal.handle, position, pose.quat, seed, arm.q_min, arm.q_max, q)
@@ -182,7 +187,7 @@ def sample_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeti
     Args:
         arm: built from a description.
         motion: what the tool does.
-        q_free: joint positions while it does so and nothing is in the way, one row a ms, (T, n), rad.
+        q_free: joint positions while it does so and nothing is in its path, one row a ms, (T, n), rad.
     """
     rng = scene_rng(motion.seed, 1)
     meetings: list[Meeting] = []
@@ -226,7 +231,7 @@ def _sample_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random
 
 
 def _touching(arm: Arm, q: np.ndarray, at: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
-    """Give where on a line a sphere just touches the arm: the surface drawn may lie within another capsule."""
+    """Return where on a line a sphere just touches the arm: the point sampled may lie within another capsule."""
     near, far = 0.0, 0.5
     while far - near > 1e-5:
         middle = 0.5 * (near + far)
@@ -235,51 +240,10 @@ def _touching(arm: Arm, q: np.ndarray, at: np.ndarray, normal: np.ndarray, radiu
 
 
 def sample_obstacle(rng: np.random.Generator, radius: float, may_be_fixed: bool) -> Obstacle:
-    """Draw a sphere of 0.5 to 5 kg on springs, log-uniform 1 to 75 kN/m, or (one in eight) a fixed one."""
+    """Sample a sphere of 0.5 to 5 kg on springs, log-uniform 1 to 75 kN/m, or (one in eight) a fixed one."""
     stiffness = math.exp(rng.uniform(math.log(1e3), math.log(75e3)))
     mass, fixed = math.exp(rng.uniform(math.log(0.5), math.log(5.0))), rng.random() < 0.125
-    return Obstacle((0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SKIN_S)
-
-
-def description_and_tool(arm: Arm) -> tuple[ArmDescription, Tool]:
-    """Give what an arm was built from.
-
-    Raises:
-        InvalidInputError: it was not built from a description.
-    """
-    if arm.description is None or arm.tool is None:
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no description to know its surface by; give contactsafe.robots.panda()"
-        )
-    return arm.description, arm.tool
-
-
-def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Draw a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
-    description, tool = description_and_tool(arm)
-    capsules = tool.capsules if link > arm.n else description.links[link - 1].capsules
-    capsule = capsules[rng.integers(len(capsules))]
-    start, end = np.array(capsule.start), np.array(capsule.end)
-    normal = rng.standard_normal(3)
-    normal /= np.linalg.norm(normal)
-    along = end - start
-    foot = start + rng.random() * along
-    if along @ normal > 0 and rng.random() < 0.3:
-        foot = end  # a round end
-    else:
-        axis = along / np.linalg.norm(along)
-        normal -= (normal @ axis) * axis
-        normal /= np.linalg.norm(normal)
-    return foot + capsule.radius * normal, normal
-
-
-def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
-    """Give the least distance of a point from the arm's capsules over postures q (T, n), m."""
-    starts, ends, radii, _ = arm_capsules(*description_and_tool(arm), q)
-    along = ends - starts
-    share = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
-    nearest = starts + np.clip(share, 0.0, 1.0)[..., None] * along
-    return float((np.linalg.norm(point - nearest, axis=2) - radii).min())
+    return Obstacle((0.0, 0.0, 0.0), radius, math.inf if fixed and may_be_fixed else stiffness, mass, surface_s=_SOFT_S)
 
 
 def _vector(value: np.ndarray) -> Vector3:

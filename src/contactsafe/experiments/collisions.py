@@ -1,7 +1,7 @@
-"""Collisions nobody chose: random motions meet random obstacles anywhere along the arm; how hard, and how long?"""
+"""Collisions nobody chose: random motions meet random obstacles anywhere along the arm: which forces, for how long?"""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,39 +10,73 @@ from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import Meeting, Motion, sample_meetings, sample_motion
-from contactsafe.experiments.config import BATCH, PLANTS, ExperimentConfig
+from contactsafe.experiments.config import BATCH, PLANTS, Entry, ExperimentConfig, Progress
 from contactsafe.experiments.motions import record
-from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Progress
 from contactsafe.experiments.verdict import verdict_table, worst_tables
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.figures import Figure, Panel, length, scalar
+from contactsafe.results.metrics import CONTACT_N, Metric
+from contactsafe.results.recording import Recording
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.worlds import Worlds
 
+NAME = "collisions"
 QUESTION = (
-    "The tool sweeps or holds, wiping or in free air, and a random point of the arm meets something soft or stiff: "
-    "how hard is the contact, and for how long?"
+    "The tool sweeps or holds, sliding on a surface or in free air, and a random point of the arm meets something soft "
+    "or stiff: what are the contact forces, and for how long?"
+)
+METRICS = (
+    Metric("contact_peak_n", "contact force, peak", "N", main=True),
+    Metric("contact_steady_n", "contact force, steady", "N", main=True),
+    Metric("impulse_ns", "impulse of the contact", "N s"),
+    Metric("tau_peak_nm", "external joint torque, peak", "N m"),
+    Metric("tau_steady_nm", "external joint torque, steady", "N m"),
+    Metric("detect_ms", "contact to its detection", "ms"),
+    Metric("tool_error_mm", "tool away from its free motion, most", "mm"),
+    Metric("tool_error_end_mm", "tool away from its free motion, at the end", "mm"),
+    Metric("tool_force_peak_n", "tool force, peak", "N"),
+    Metric("comply_fraction", "time complying", "%", 100.0),
+    Metric("reject_fraction", "time rejecting", "%", 100.0),
+    Metric("mode_switches", "changes of mode"),
+    Metric("limit_touches", "touches of joint limits"),
+    Metric("met", "trials in which the obstacle was touched, mean", "%", 100.0, mean=True),
+)
+CURVES = Figure(
+    plots=(
+        (
+            Panel("contact force", "N", scalar("obstacle_force")),
+            Panel("mode: 0 free, 1 comply, 2 reject", "", lambda run: run.trace["mode"] * (1.0 + run.trace["holding"])),
+            Panel("tool away from its free motion", "mm", length("error", 1000.0)),
+        ),
+    ),
+    caption="Force of the obstacle on the arm, of two the larger; the controller's mode; the tool.",
 )
 STEADY_S = 0.5
 """The last part of a trial, over which steady figures are means, s."""
-
-CONTACT_N = 0.5
-"""Obstacle force that counts as contact, N."""
 
 _AT_LIMIT_RAD = 1e-3
 _FIXED_N_M = 1e6  # what stands for the stiffness of an obstacle that cannot move
 
 
-def collisions(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+def collisions(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
     """Run the battery; it needs no policy.
 
     Args:
-        bundle: not used.
         config: controllers, seeds and plants.
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
     return run_battery(controllers, config.seeds, config.plants, progress)
+
+
+ENTRY = Entry(
+    NAME,
+    "random motions meet random obstacles anywhere on the arm.",
+    collisions,
+    count=lambda config: config.count(len(config.plants)),
+    trials=100,
+)
 
 
 def run_battery(
@@ -51,7 +85,7 @@ def run_battery(
     plants: Sequence[str] = PLANTS,
     progress: Progress | None = None,
 ) -> Experiment:
-    """Put controllers through the same collisions. What becomes of a seed does not depend on the others.
+    """Put controllers through the same collisions. A seed's trial does not depend on the others.
 
     Args:
         controllers: configurations by name; they are compared with 'vices' where it is among them, else with the first.
@@ -60,7 +94,8 @@ def run_battery(
         progress: told how many trials were just done.
 
     Returns:
-        A trial for each seed, plant and controller, recordings of the first seed, tables of verdicts and worst trials.
+        A trial for each seed, plant and controller, recordings of the first seed, tables of the comparison and of the
+        worst trials.
 
     Raises:
         InvalidInputError: no controller, no seed, or a plant that is not one of `PLANTS`.
@@ -85,7 +120,9 @@ def run_battery(
         pool.shutdown(cancel_futures=True)
     trials = tuple(trial for of_batch, _ in done for trial in of_batch)
     tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers, plants)))
-    return Experiment("collisions", QUESTION, trials, tuple(done[0][1]), tables)
+    return Experiment(
+        NAME, "Collisions", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,), tables=tables
+    )
 
 
 def _run_batch(
@@ -96,7 +133,7 @@ def _run_batch(
     progress: Progress | None,
     recorded: bool,
 ) -> tuple[list[Trial], list[Recording]]:
-    """Give the trials of some seeds, and recordings of the first of them where wanted."""
+    """Return the trials of some seeds, and recordings of the first of them where wanted."""
     batch = _Batch(arm, seeds)
     trials: list[Trial] = []
     recordings: list[Recording] = []
@@ -111,7 +148,7 @@ def _run_batch(
 
 
 def _replay(controllers: Mapping[str, ControllerConfig], plants: Sequence[str]) -> str:
-    """Say how one seed is run again, with {seed} in its place."""
+    """Return how one seed is run again, with {seed} in its place."""
     if all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
         names = "" if tuple(controllers) == ExperimentConfig.controllers else f" --controllers {','.join(controllers)}"
         names += "" if tuple(plants) == PLANTS else f" --plants {','.join(plants)}"
@@ -138,7 +175,7 @@ class _Batch:
             sample_meetings(arm, motion, trace["q"]) for motion, trace in zip(self.motions, self.free, strict=True)
         ]
 
-    def run(self, controllers: Mapping[str, ControllerConfig], plant: str):
+    def run(self, controllers: Mapping[str, ControllerConfig], plant: str) -> Iterator[tuple[str, list[np.ndarray]]]:
         """Yield each controller's name and its traces, one a scene."""
         worlds = self._worlds(self.meetings, None, plant)
         for name, controller in controllers.items():
@@ -161,13 +198,15 @@ class _Batch:
         ]
 
     def recording(self, controller: str, plant: str, traces: Sequence[np.ndarray]) -> Recording:
-        """Give the first scene as a recording, its error the tool's departure from the free motion."""
+        """Return the first scene as a recording, its error the tool's departure from the free motion."""
         trace = traces[0].copy()
         trace["error"][:, :3] = self.free[0]["position"] - trace["position"]
         heading = Trial(describe(self.motions[0]), controller, self.seeds[0], {}, plant).heading
-        return Recording(heading, controller, self.seeds[0], trace, np.zeros((1, 1, 1), np.uint8), len(trace))
+        return Recording(heading, controller, self.seeds[0], trace)
 
-    def _worlds(self, meetings, controller: ControllerConfig | None, plant: str) -> Worlds:
+    def _worlds(
+        self, meetings: Sequence[tuple[Meeting, ...]], controller: ControllerConfig | None, plant: str
+    ) -> Worlds:
         configs = [
             motion.world(tuple(meeting.obstacle for meeting in met), plant == "real")
             for motion, met in zip(self.motions, meetings, strict=True)
@@ -176,8 +215,8 @@ class _Batch:
 
 
 def describe(motion: Motion) -> str:
-    """Say in words what the tool was doing."""
-    return f"{'hold' if motion.holds else 'sweep'} {'wiping' if motion.wiping else 'in free air'}"
+    """Return in words what the tool does."""
+    return f"{'hold' if motion.holds else 'sweep'} {'on a surface' if motion.slides else 'in free air'}"
 
 
 def scene_metrics(motion: Motion, meetings: tuple[Meeting, ...]) -> dict[str, float]:
@@ -189,7 +228,7 @@ def scene_metrics(motion: Motion, meetings: tuple[Meeting, ...]) -> dict[str, fl
         "obstacle_stiffness_n_m": _FIXED_N_M if stiffest.obstacle.fixed else stiffest.obstacle.stiffness,
         "obstacle_mass_kg": stiffest.obstacle.mass,
         "speed_m_s": 0.0 if motion.holds else motion.speed_m_s,
-        "lead_limited": float(motion.limited),
+        "target_offset_limited": float(motion.limited),
     }
 
 
@@ -198,7 +237,7 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
 
     Args:
         trace: `trace_dtype` records, (T,).
-        free: the same motion with nothing in the way, (T,).
+        free: the same motion with nothing in its path, (T,).
         arm: for its joint range.
     """
     force = trace["obstacle_force"]
@@ -209,7 +248,7 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
     at_limit = ((trace["q"] < arm.q_min + _AT_LIMIT_RAD) | (trace["q"] > arm.q_max - _AT_LIMIT_RAD)).any(axis=1)
     contact = trace["mode"] == 1
     first = int(np.argmax(touching))
-    found = trace["link"][first:] > 0
+    reported = trace["link"][first:] > 0
     return {
         "met": float(touching.any()),
         "contact_peak_n": float(force.max()),
@@ -217,7 +256,7 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
         "impulse_ns": float(force.sum() / 1000.0),
         "tau_peak_nm": float(tau.max()),
         "tau_steady_nm": float(tau[steady].mean()),
-        "detect_ms": float(np.argmax(found)) if touching.any() and found.any() else float("nan"),
+        "detect_ms": float(np.argmax(reported)) if touching.any() and reported.any() else float("nan"),
         "tool_error_mm": float(1000.0 * away.max()),
         "tool_error_end_mm": float(1000.0 * away[-1]),
         "tool_force_peak_n": float(np.linalg.norm(trace["tool_force"], axis=1).max()),

@@ -1,21 +1,28 @@
-"""What every experiment can be told."""
+"""What every experiment can be told, and how one is entered into the registry."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.task import ExperimentTask
+from contactsafe.policy.bundle import Bundle
+from contactsafe.results.experiment import Experiment
 
 BATCH = 16
 """Most trials stepped together: bounds the memory that their traces take."""
 
 PLANTS = ("real", "clean")
-"""The arm and its sensors with errors drawn at random, or just as the controller's model has them."""
+"""The arm and its sensors with errors sampled at random, or just as the controller's model has them."""
+
+Progress = Callable[[int], object]
+"""Told how many trials were just done."""
 
 
 @dataclass(frozen=True)
 class ExperimentConfig:
-    """Which controllers, how often, from which seed.
+    """Which controllers, how often, from which seed, and on what.
 
     Attributes:
         controllers: presets by name, in the order they are reported.
@@ -23,6 +30,8 @@ class ExperimentConfig:
         seed: first seed.
         plants: some of `PLANTS`, for collisions.
         minutes: simulated time in which detection counts false alarms, min.
+        task: for experiments that run one.
+        bundle: policy, for experiments that run one.
     """
 
     controllers: tuple[str, ...] = ("vices", "paper", "safe")
@@ -30,6 +39,8 @@ class ExperimentConfig:
     seed: int = 0
     plants: tuple[str, ...] = PLANTS
     minutes: float = 60.0
+    task: ExperimentTask | None = None
+    bundle: Bundle | None = None
 
     def __post_init__(self):
         """Refuse unknown controllers and empty experiments."""
@@ -54,5 +65,50 @@ class ExperimentConfig:
         return range(self.seed, self.seed + self.trials)
 
     def batches(self) -> list[range]:
-        """Give the seeds in batches that are stepped together."""
+        """Return the seeds in batches that are stepped together."""
         return [self.seeds[first : first + BATCH] for first in range(0, self.trials, BATCH)]
+
+    def count(self, scenarios: int = 1) -> int:
+        """Return the number of trials: of each controller and seed so many scenarios."""
+        return self.trials * len(self.controllers) * scenarios
+
+    def require_task(self) -> ExperimentTask:
+        """Return the task.
+
+        Raises:
+            InvalidInputError: none was given.
+        """
+        if self.task is None:
+            raise InvalidInputError("this experiment runs a task, and none is given; give ExperimentConfig(task=...)")
+        return self.task
+
+    def require_bundle(self) -> Bundle:
+        """Return the policy bundle.
+
+        Raises:
+            InvalidInputError: none was given.
+        """
+        if self.bundle is None:
+            raise InvalidInputError("this experiment runs a policy; give ExperimentConfig(bundle=Bundle.load(...))")
+        return self.bundle
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One experiment as the registry has it.
+
+    Attributes:
+        name: on the command line.
+        about: what it does, in half a line.
+        run: the experiment, told of every trial done.
+        count: how many trials of all controllers a configuration comes to.
+        trials: seeds tried where nobody says how many.
+        needs_policy: whether it runs a policy bundle.
+    """
+
+    name: str
+    about: str
+    run: Callable[[ExperimentConfig, Progress | None], Experiment]
+    count: Callable[[ExperimentConfig], int] = ExperimentConfig.count
+    trials: int = 10
+    needs_policy: bool = False

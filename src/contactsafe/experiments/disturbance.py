@@ -1,21 +1,24 @@
-"""Disturbance: lasting pushes of 25 N on the arm while the tool holds and while it wipes; how far does it stray?"""
+"""Disturbance: lasting pushes of 25 N on the arm while the tool holds and while it works; how far does it stray?"""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from contactsafe.experiments.collision_scenes import sample_plant, scene_rng
-from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Act, Progress, Run, held_out, holding, run_policy
-from contactsafe.policy.action_config import ActionConfig
+from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.experiments.run import Run, run_policy, steps_in
+from contactsafe.experiments.task import ExperimentTask
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.figures import Figure, Panel, component
+from contactsafe.results.metrics import Aim, Highlight, Metric
+from contactsafe.results.recording import Recording
 from contactsafe.robot import robots
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
-from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.tasks import WipingTasks
 
+NAME = "disturbance"
 QUESTION = (
-    "Somebody leans on the arm with 25 N while the tool holds still, and while it wipes (K1 = 75 1/s², a soft tool; "
+    "Somebody leans on the arm with 25 N while the tool holds still, and while it works (K1 = 75 1/s², a soft tool; "
     "plant and sensors differ from the model): how far does the tool stray?"
 )
 PUSH_N = 25.0
@@ -24,31 +27,51 @@ DURATION_S = 2.5
 PUSH_POINTS = {4: (-0.0825, 0.12, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
 """Where each link is pushed: end of the forearm near the elbow, its middle, the wrist; in the link's frame, m."""
 
-MODES = ("holding", "wiping")
+AT_REST = "at rest"
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 """K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
 
-_HOLD_HEIGHT = 0.06  # m above the board
-_PRESS = 0.004  # depth of x_d below the board while wiping, m
-_STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
+METRICS = (
+    Metric(
+        "error_max_mm", "tool error, largest axis", "mm", main=True,
+        aim=Aim(at_most=10.0, where_baseline_above=25.0, ratio_at_most=1 / 3),
+    ),
+    *(Metric(f"error_{axis}_mm", f"tool error, {axis}", "mm") for axis in "xyz"),
+    Metric("error_end_mm", "tool error at the end of the push", "mm"),
+    Metric("error_after_mm", "tool error after the push", "mm"),
+)  # fmt: skip
+HIGHLIGHTS = (Highlight("push on link 5 while at rest", "error_max_mm", "Tool error under a push on the forearm"),)
 
 
-def disturbance(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
-    """Run the experiment; it needs no policy, strokes are scripted so that all controllers are asked the same.
+def during_push(run: Recording) -> np.ndarray:
+    """Return which ticks of a recording the push lasts, (T,)."""
+    return _lasts(run.trace["time"])
+
+
+CURVES = Figure(
+    plots=(tuple(Panel(f"tool error, {axis}", "mm", component("error", i, 1000.0)) for i, axis in enumerate("xyz")),),
+    caption="Departure of the tool from where it is without the push. Shaded: the push.",
+    columns=3,
+    shaded=during_push,
+)
+
+
+def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+    """Run the experiment; it needs no policy, motions are scripted so that all controllers are asked the same.
 
     Args:
-        bundle: not used.
-        config: controllers and seeds.
+        config: controllers, seeds and task.
         progress: told of every trial done.
     """
+    task = config.require_task()
     trials: list[Trial] = []
     recordings: list[Recording] = []
-    for mode in MODES:
+    for mode in modes(task):
         for name in config.controllers:
             for seeds in config.batches():
-                calm = _run(mode, name, seeds, None)
+                calm = _run(task, mode, name, seeds, None)
                 for link in PUSH_POINTS:
-                    pushed = _run(mode, name, seeds, link)
+                    pushed = _run(task, mode, name, seeds, link)
                     scenario = f"push on link {link} while {mode}"
                     for i, seed in enumerate(seeds):
                         metrics = deviation_metrics(pushed.traces[i], calm.traces[i])
@@ -58,50 +81,44 @@ def disturbance(bundle, config: ExperimentConfig, progress: Progress | None = No
                         recordings.append(pushed.recording(0, scenario, name, config.seed))
                     if progress:
                         progress(len(seeds))
-    return Experiment("disturbance", QUESTION, tuple(trials), tuple(recordings))
+    return Experiment(
+        NAME,
+        "Disturbance",
+        QUESTION,
+        trials=tuple(trials),
+        metrics=METRICS,
+        highlights=HIGHLIGHTS,
+        recordings=tuple(recordings),
+        figures=(CURVES,),
+    )
+
+
+ENTRY = Entry(
+    NAME, "somebody leans on the arm with 25 N.", disturbance, count=lambda config: config.count(2 * len(PUSH_POINTS))
+)
+
+
+def modes(task: ExperimentTask) -> tuple[str, str]:
+    """Return what the tool does while the arm is pushed."""
+    return (AT_REST, task.name)
 
 
 def push_force(seed: int, link: int) -> np.ndarray:
-    """Draw the horizontal direction of one push and give its force, world axes, (3,), N."""
+    """Sample the horizontal direction of one push; return its force, world axes, (3,), N."""
     angle = np.random.default_rng([seed, link]).uniform(-math.pi, math.pi)
     return PUSH_N * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def _run(mode: str, controller: str, seeds: range, link: int | None) -> Run:
-    config = WipingConfig(controller=controller, action=ActionConfig(stiffness_start=STIFFNESS, press=_PRESS))
-    arm = robots.panda()
-    worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), arm.n), sensors=REAL_SENSORS) for seed in seeds]
-    tasks = WipingTasks(config, len(seeds), list(seeds), worlds)
-    x, y, z = tasks.config.world.board.centre
-    start = np.array([x, y, z + _HOLD_HEIGHT])
-    if mode == "wiping":
-        start[2] = z + 0.001
-    for i, seed in enumerate(seeds):
-        tasks.reset(i, held_out(seed), start=start)
-        if link is not None:
-            tasks.worlds.push(i, f"link{link}", PUSH_POINTS[link], push_force(seed, link), *PUSH_S)
-    act = holding() if mode == "holding" else strokes(tasks)
-    run = run_policy(tasks, act, round(DURATION_S * 60), stop_when_clean=False)
-    tasks.worlds.close()
+def _run(task: ExperimentTask, mode: str, controller: str, seeds: Sequence[int], link: int | None) -> Run:
+    n = robots.panda().n
+    worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), n), sensors=REAL_SENSORS) for seed in seeds]
+    episodes, act = task.scripted(controller, seeds, worlds, STIFFNESS, works=mode == task.name)
+    if link is not None:
+        for i, seed in enumerate(seeds):
+            episodes.worlds.push(i, f"link{link}", PUSH_POINTS[link], push_force(seed, link), *PUSH_S)
+    run = run_policy(episodes, act, steps_in(DURATION_S))
+    episodes.worlds.close()
     return run
-
-
-def strokes(tasks: WipingTasks) -> Act:
-    """Give a script that presses the pad on the board and strokes sideways from where the tool stands."""
-    action = tasks.config.action
-    step = 0
-
-    def act(observation: dict[str, np.ndarray]) -> np.ndarray:
-        nonlocal step
-        actions = np.zeros((len(observation["pose"]), 18))
-        phase = 2 * math.pi / (60 * _PERIOD_S)
-        actions[:, 1] = _STROKE * (math.sin(phase * (step + 1)) - math.sin(phase * step)) / action.translation[1]
-        down = (0.001 + _PRESS) / 6  # over the first six steps
-        actions[:, 2] = -down / action.translation[2] if step < 6 else 0.0
-        step += 1
-        return actions
-
-    return act
 
 
 def deviation_metrics(pushed: np.ndarray, calm: np.ndarray) -> dict[str, float]:
@@ -111,7 +128,7 @@ def deviation_metrics(pushed: np.ndarray, calm: np.ndarray) -> dict[str, float]:
         pushed, calm: `trace_dtype` records of the two runs, same seed, (T,).
     """
     away = 1000.0 * np.abs(pushed["position"] - calm["position"])
-    during = (pushed["time"] >= PUSH_S[0]) & (pushed["time"] < PUSH_S[1])
+    during = _lasts(pushed["time"])
     names = ("error_x_mm", "error_y_mm", "error_z_mm")
     peaks = away[during].max(axis=0)
     return {name: float(peak) for name, peak in zip(names, peaks, strict=True)} | {
@@ -120,3 +137,7 @@ def deviation_metrics(pushed: np.ndarray, calm: np.ndarray) -> dict[str, float]:
         "error_after_mm": float(away[~during & (pushed["time"] >= PUSH_S[1])].max()),
         "tool_force_peak_n": float(np.linalg.norm(pushed["tool_force"], axis=1).max()),
     }
+
+
+def _lasts(time_s: np.ndarray) -> np.ndarray:
+    return (time_s >= PUSH_S[0]) & (time_s < PUSH_S[1])

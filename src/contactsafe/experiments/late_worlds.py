@@ -7,12 +7,13 @@ import numpy as np
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.tick import control_tick
 from contactsafe.core.compiled import compiled
-from contactsafe.core.native import mj_step
 from contactsafe.experiments.collision_scenes import Motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.robot.arm import Arm
+from contactsafe.sim import mujoco_backend
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.stepping import act, begin_step_metrics, end_tick, sense
+from contactsafe.sim.sensing import sense
+from contactsafe.sim.stepping import begin_step, drive, end_step, end_tick
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
@@ -31,47 +32,54 @@ class LateWorlds(Worlds):
     """
 
     def __init__(
-        self, arm: Arm, worlds: Sequence[WorldConfig], controller: ControllerConfig, seeds: Sequence[int], codes, timed
-    ):
+        self, arm: Arm, worlds: Sequence[WorldConfig], controller: ControllerConfig, seeds: Sequence[int],
+        codes: np.ndarray, timed: bool,
+    ):  # fmt: skip
         super().__init__(arm, worlds, controller, len(worlds), seeds)
         self.codes, self.timed = np.asarray(codes, dtype=np.int64), timed
         self._held = np.zeros((len(worlds), 2 * arm.n + 7))
 
-    def run(self, ticks, trace: np.ndarray | None = None) -> None:
+    def run(self, ticks: int | np.ndarray, trace: np.ndarray | None = None) -> None:
         """Run control ticks in every world; see `Worlds.run`."""
         ticks = self._checked(ticks, trace)
         traces = self.no_trace if trace is None else trace
 
-        def share(start: int, stop: int) -> None:
+        def chunk(start: int, stop: int) -> None:
             noise = self.sample_noise(start, stop)
             _run_late(
-                start, stop, self.plants, self.controllers, self.cells, noise, ticks, self.reports, traces, self.codes,
-                self.timed, self._held,
+                start, stop, self.records, self.controllers, noise, ticks, self.metrics, self.samples, traces,
+                self.codes, self.timed, self._held,
             )  # fmt: skip
 
-        self.in_threads(share)
+        self.in_threads(chunk)
 
 
 @compiled(nogil=True)
-def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, traces, codes, timed, held):
+def _run_late(
+    start: int, stop: int, worlds: np.ndarray, controllers: np.ndarray, noise: np.ndarray, ticks: np.ndarray,
+    metrics: np.ndarray, samples: np.ndarray, traces: np.ndarray, codes: np.ndarray, timed: bool, held: np.ndarray,
+) -> None:  # fmt: skip
     for i in range(start, stop):
-        plant, controller = plants[i], controllers[i]
-        begin_step_metrics(reports[i], ticks[i])
+        world, controller = worlds[i], controllers[i]
+        begin_step(metrics[i], ticks[i])
         for k in range(ticks[i]):
-            sense(plant, controller, noise[i, k])
-            code = codes[i, plant.tick]
+            sense(world, controller, noise[i, k])
+            code = codes[i, world.tick]
             controller.measurement.has_time = 1 if timed else 0
-            controller.measurement.time = plant.tick * controller.params.dt
+            controller.measurement.time = world.tick * controller.params.dt
             _corrupt(controller.measurement, code, held[i])
             if code != NO_CALL:
                 control_tick(controller)
-            act(plant, controller, noise[i, k])
-            mj_step(plant.model, plant.data)
-            end_tick(plant, controller, cells[i], reports[i], traces[i], k)
+            drive(world, controller, noise[i, k])
+            mujoco_backend.write(world)
+            mujoco_backend.step(world)
+            mujoco_backend.read(world)
+            end_tick(world, controller, metrics[i], samples[i], traces[i], k)
+        end_step(metrics[i])
 
 
 @compiled
-def _corrupt(measurement, code, held):
+def _corrupt(measurement: np.record, code: int, held: np.ndarray) -> None:
     """Make of a measurement what the controller sees; `held` has the last one as it was seen."""
     n = measurement.q.shape[0]
     if code == FROZEN:
@@ -106,7 +114,7 @@ class LatePlayback(Playback):
         self._silent = silent
 
     def record(self) -> np.ndarray:
-        """Play to the end; give `trace_dtype` records, (n, ticks)."""
+        """Play to the end; return `trace_dtype` records, (n, ticks)."""
         step = np.zeros((self.worlds.n, MAX_TICKS), dtype=trace_dtype(self.worlds.arm.n))
         pieces = []
         while self.running.any():

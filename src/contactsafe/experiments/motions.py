@@ -1,4 +1,4 @@
-"""Playing motions in simulated worlds: x_d goes its way, at 60 Hz as a policy would move it."""
+"""Playing motions in simulated worlds: x_d follows its path, moved once a policy step."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactsafe.core.copying import Independent
-from contactsafe.experiments.collision_scenes import LEAD_M, Motion
+from contactsafe.experiments.collision_scenes import TARGET_OFFSET_MAX_M, Motion
 from contactsafe.robot.ik import solve_ik
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds, ticks_of_step
@@ -64,14 +64,14 @@ class Playback(Independent):
         return ticks
 
     def _aim(self, i: int, time_s: float) -> None:
-        """Set x_d where the motion has it, within its lead, and the posture that goes with it."""
+        """Set x_d where the motion has it, within its offset, and the posture that goes with it."""
         motion, arm, tool, q_posture = self.motions[i], self.worlds.arm, self._tool[i], self._target["q_posture"][i]
         position = motion.target(time_s)
         if motion.limited:
             away = position - tool
             distance = math.sqrt(away @ away)
-            if distance > LEAD_M:
-                position = tool + away * (LEAD_M / distance)
+            if distance > TARGET_OFFSET_MAX_M:
+                position = tool + away * (TARGET_OFFSET_MAX_M / distance)
         self._target["position"][i] = position
         q = np.empty(arm.n)
         error, turn = solve_ik(self._nominal.handle, position, motion.start.quat, q_posture, arm.q_min, arm.q_max, q)

@@ -1,91 +1,110 @@
-"""Running tasks under a policy or a script, with every tick recorded."""
+"""Running a task's episodes under a policy or a script, with every tick recorded."""
 
-from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from contactsafe.core.errors import BundleError
-from contactsafe.experiments.results import Recording
+from contactsafe.experiments.task import Act, Episodes
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
+from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ
-from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
-from contactsafe.tasks.wiping.tasks import WipingTasks
-
-Act = Callable[[dict[str, np.ndarray]], np.ndarray]
-"""From a batch of observations to actions, (n, 18)."""
 
 
-Progress = Callable[[int], object]
-"""Told how many trials were just done."""
-
-
+@dataclass(frozen=True)
 class Run:
-    """What N tasks did, tick by tick.
+    """What N episodes did, tick by tick.
 
     Attributes:
-        traces: one array of `trace_dtype` records for each task.
-        ended: policy step at which each task ended, (n,).
-        clean: whether each task's board was clean when it ended.
-        boards: the boards at every policy step that was kept, uint8 (F, n, rows, columns).
-        board_every: ticks between them.
+        traces: one array of `trace_dtype` records for each.
+        curves: what each recorded beside it, by name, one value a tick.
+        ended: policy step at which each ended, (n,).
+        succeeded: whether each had reached its goal when it ended, (n,).
+        pictures: of every policy step that was kept, uint8 (F, n, rows, columns).
+        picture_every: ticks between them.
     """
 
-    def __init__(
-        self, traces: list[np.ndarray], ended: np.ndarray, clean: list[bool], boards: np.ndarray, board_every: int
-    ):
-        self.traces, self.ended, self.clean = traces, ended, clean
-        self.boards, self.board_every = boards, board_every
+    traces: list[np.ndarray]
+    curves: list[dict[str, np.ndarray]]
+    ended: np.ndarray
+    succeeded: np.ndarray
+    pictures: np.ndarray
+    picture_every: int
 
-    def recording(self, i: int, scenario: str, controller: str, seed: int, obstacle=None) -> Recording:
-        """Give task i as a recording."""
-        return Recording(scenario, controller, seed, self.traces[i], self.boards[:, i], self.board_every, obstacle)
+    def recording(
+        self, i: int, scenario: str, controller: str, seed: int, obstacle: tuple[float, float] | None = None
+    ) -> Recording:
+        """Return episode i as a recording."""
+        return Recording(
+            scenario,
+            controller,
+            seed,
+            self.traces[i],
+            obstacle,
+            self.pictures[:, i],
+            self.picture_every,
+            self.curves[i],
+        )
 
 
-def run_policy(tasks: WipingTasks, act: Act, steps: int, stop_when_clean: bool, board_every_steps: int = 12) -> Run:
-    """Run a policy in all tasks from where they stand.
+@dataclass
+class _Pieces:
+    """What one episode recorded so far, a piece a policy step."""
+
+    traces: list[np.ndarray] = field(default_factory=list)
+    curves: dict[str, list[np.ndarray]] = field(default_factory=dict)
+
+    def add(self, trace: np.ndarray, curves: dict[str, float]) -> None:
+        self.traces.append(trace.copy())
+        for name, value in curves.items():
+            self.curves.setdefault(name, []).append(np.full(len(trace), value))
+
+    def joined(self) -> dict[str, np.ndarray]:
+        return {name: np.concatenate(pieces) for name, pieces in self.curves.items()}
+
+
+def run_policy(episodes: Episodes, act: Act, steps: int, to_the_end: bool = True, picture_every_steps: int = 12) -> Run:
+    """Run a policy in all episodes from where they stand.
 
     Args:
-        tasks: reset.
+        episodes: begun.
         act: the policy.
         steps: policy steps.
-        stop_when_clean: end a task's trace when its board is clean or its arm met the table.
-        board_every_steps: policy steps between kept boards.
+        to_the_end: go on where an episode is terminated; otherwise its trace ends there.
+        picture_every_steps: policy steps between kept pictures.
     """
-    n = tasks.worlds.n
-    trace = np.zeros((n, MAX_TICKS), dtype=trace_dtype(tasks.arm.n))
-    pieces: list[list[np.ndarray]] = [[] for _ in range(n)]
-    ended = np.full(n, steps)
-    clean = np.zeros(n, bool)
-    boards, ticks = [tasks.worlds.cells.copy()], 0
+    n = episodes.worlds.n
+    trace = np.zeros((n, MAX_TICKS), dtype=trace_dtype(episodes.arm.n))
+    pieces = [_Pieces() for _ in range(n)]
+    ended, succeeded = np.full(n, steps), np.zeros(n, bool)
+    pictures = [episodes.pictures()]
     for step in range(steps):
-        tasks.step(act(tasks.observation()), trace)
-        ticks += int(tasks.worlds.reports["ticks"][0])
-        share = tasks.tasks["ink"] / np.maximum(tasks.tasks["ink_start"], 1)
-        for i in range(n):
-            if ended[i] == steps:
-                clean[i] = tasks.tasks["clean"][i] == 1
-                rows = trace[i, : tasks.worlds.reports["ticks"][i]].copy()
-                rows["ink_left"] = share[i]
-                pieces[i].append(rows)
-        if (step + 1) % board_every_steps == 0:
-            boards.append(tasks.worlds.cells.copy())
-        if stop_when_clean:
-            ended = np.where((ended == steps) & tasks.terminated, step + 1, ended)
+        episodes.step(act(episodes.observation()), trace)
+        curves, running = episodes.curves(), ended == steps
+        succeeded = np.where(running, episodes.succeeded, succeeded)
+        for i in np.flatnonzero(running).tolist():
+            rows = trace[i, : episodes.worlds.metrics["ticks"][i]]
+            pieces[i].add(rows, {name: float(values[i]) for name, values in curves.items()})
+        if (step + 1) % picture_every_steps == 0:
+            pictures.append(episodes.pictures())
+        if not to_the_end:
+            ended = np.where(running & episodes.terminated, step + 1, ended)
             if (ended <= step + 1).all():
                 break
-    board_every = round(board_every_steps * 1000 / 60)
-    return Run([np.concatenate(p) for p in pieces], ended, clean.tolist(), np.array(boards), board_every)
+    picture_every = round(picture_every_steps * 1000 / POLICY_RATE_HZ)
+    traces = [np.concatenate(piece.traces) for piece in pieces]
+    return Run(traces, [piece.joined() for piece in pieces], ended, succeeded, np.array(pictures), picture_every)
 
 
-def held_out(seed: int) -> np.random.Generator:
-    """Give the generator of a trial's board and start: none that training has drawn from."""
-    return np.random.default_rng(HELD_OUT_SEED + seed)
+def steps_in(duration_s: float) -> int:
+    """Return the policy steps of a duration, s."""
+    return round(duration_s * POLICY_RATE_HZ)
 
 
-def policy_for(bundle: Bundle, tasks: WipingTasks) -> Policy:
-    """Make the policy of a bundle for these tasks.
+def policy_for(bundle: Bundle, episodes: Episodes) -> Policy:
+    """Return the policy of a bundle for these episodes.
 
     Raises:
         BundleError: it was trained for another rate.
@@ -95,9 +114,4 @@ def policy_for(bundle: Bundle, tasks: WipingTasks) -> Policy:
             f"{bundle.folder} acts at {bundle.rate_hz:g} Hz, {bundle.action_repeat} steps an action; "
             f"experiments run at {POLICY_RATE_HZ} Hz, one step an action: give a bundle trained so"
         )
-    return Policy(bundle, tasks.worlds.homography)
-
-
-def holding() -> Act:
-    """Give the policy that changes nothing."""
-    return lambda observation: np.zeros((len(observation["pose"]), 18))
+    return Policy(bundle, episodes.camera_homography)

@@ -9,13 +9,13 @@ import numpy as np
 from contactsafe.control.tick import control_tick, tick_at
 from contactsafe.core.compiled import compiled
 from contactsafe.core.native import mj_step
+from contactsafe.experiments.task import Episodes, ExperimentTask
 from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
+from contactsafe.sim.sensing import noise_channels
 from contactsafe.sim.stepping import run_ticks
-from contactsafe.sim.truth import noise_channels
-from contactsafe.tasks.wiping.camera import render_mask_into
-from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.sim.truth import sample_dtype
 
 ROUNDS = 15
 """Times each part is timed."""
@@ -42,36 +42,35 @@ class Speed:
 
 
 @compiled(nogil=True)
-def _bare_physics(model, data, n):
+def _bare_physics(model: int, data: int, n: int) -> None:
     for _ in range(n):
         mj_step(model, data)
 
 
 @compiled(nogil=True)
-def _ticks(controller, n):
+def _ticks(controller: np.record, n: int) -> None:
     controller.measurement.qd[:] = 0.0  # one that moves and never changes is not believed
     for _ in range(n):
         control_tick(controller)
 
 
-def measure_speed(bundle, progress: Callable[[int], object] | None = None) -> list[Speed]:
-    """Time bare physics, physics with the tick, the tick, the mask, the policy and the environment, in turns.
+def measure_speed(task: ExperimentTask, bundle: Bundle, progress: Callable[[int], object] | None = None) -> list[Speed]:
+    """Time bare physics, physics with the tick, the tick, the task's parts, the policy and the episodes, in turns.
 
-    Parts of one thread are timed by the processor time they take, so that others on the machine weigh less; the
-    environment, whose threads share the cores, by the clock on the wall.
+    Parts of one thread are timed by the processor time they take, so that other load on the machine counts less; the
+    episodes, whose threads divide the cores between them, by the clock on the wall.
 
     Args:
-        bundle: loaded `Bundle`.
+        task: whose episodes are stepped.
+        bundle: of its policy.
         progress: told of every round done.
     """
-    worlds = {"one": _tasks(1), "bare": _tasks(1), "many": _tasks(_ENVS)}
-    policy = Policy(bundle, worlds["one"].worlds.homography)
-    parts = _parts(worlds, policy)
+    episodes = {name: task.episodes("safe", range(n)) for name, n in (("one", 1), ("bare", 1), ("many", _ENVS))}
+    parts = _parts(episodes, Policy(bundle, episodes["one"].camera_homography))
     times: dict[str, list[float]] = {part.name: [] for part in parts}
     for timed in (False, *[True] * ROUNDS):
-        for tasks in worlds.values():
-            for i in range(tasks.worlds.n):
-                tasks.reset(i, np.random.default_rng(i))
+        for of_kind in episodes.values():
+            of_kind.begin()
         for part in parts:
             start = part.clock()
             part.run()
@@ -79,16 +78,12 @@ def measure_speed(bundle, progress: Callable[[int], object] | None = None) -> li
                 times[part.name].append((part.clock() - start) / part.count * 1e6)
         if timed and progress:
             progress(1)
-    worlds["many"].worlds.close()
+    episodes["many"].worlds.close()
     bare = float(np.median(times[parts[0].name]))
     return [
         Speed(name, float(np.median(values)), float(np.min(values)), float(np.median(values)) / bare)
         for name, values in times.items()
     ]
-
-
-def _tasks(n: int) -> WipingTasks:
-    return WipingTasks(WipingConfig(), n, seed=0)
 
 
 @dataclass(frozen=True)
@@ -99,48 +94,53 @@ class _Part:
     clock: Callable[[], float] = time.thread_time
 
 
-def _parts(tasks: dict[str, WipingTasks], policy: Policy) -> list[_Part]:
-    """Name each part, what runs it and how many times that is; bare physics comes first."""
-    one, many = tasks["one"], tasks["many"]
-    worlds, bare = one.worlds, tasks["bare"].worlds
+def _parts(episodes: dict[str, Episodes], policy: Policy) -> list[_Part]:
+    """Return each part, what runs it and how many times that is; bare physics comes first."""
+    one, many = episodes["one"], episodes["many"]
+    worlds, bare = one.worlds, episodes["bare"].worlds
     actions = np.zeros((_ENVS, ACTION_SIZE))
 
     noise = np.random.default_rng(0).standard_normal((_TICKS, noise_channels(one.arm.n)))
+    samples = np.zeros(_TICKS, dtype=sample_dtype)
+    plant = bare.records[0]["plant"]
 
-    def physics_and_tick():
+    def physics_and_tick() -> None:
         run_ticks(
-            worlds.plants[0], worlds.controllers[0], worlds.cells[0], noise, _TICKS, worlds.reports[0],
-            worlds.no_trace[0],
+            worlds.records[0], worlds.controllers[0], noise, _TICKS, worlds.metrics[0], samples, worlds.no_trace[0],
         )  # fmt: skip
 
-    def tick_from_python():
+    def tick_from_python() -> None:
         worlds.controllers["measurement"]["qd"] = 0.0
         for _ in range(_TICKS):
             tick_at(worlds.controllers, 0)
 
-    def masks():
-        for _ in range(50):
-            render_mask_into(worlds.camera, worlds.ink_index.shown[0], worlds.plants[0], worlds.masks[0])
-
-    def act():
+    def act() -> None:
         for _ in range(20):
-            policy.act(one.observation(0))
+            policy.act(one.observation())
 
-    def environment():
+    def environment() -> None:
         for _ in range(10):
             many.step(actions)
 
     return [
         _Part(
             "bare physics, one tick",
-            lambda: _bare_physics(bare.plants[0]["model"], bare.plants[0]["data"], _TICKS),
+            lambda: _bare_physics(plant["model"], plant["data"], _TICKS),
             _TICKS,
         ),
         _Part("physics and control tick", physics_and_tick, _TICKS),
         _Part("control tick, compiled loop", lambda: _ticks(worlds.controllers[0], _TICKS), _TICKS),
         _Part("control tick, called from Python", tick_from_python, _TICKS),
-        _Part("mask, 128 × 128", masks, 50),
+        *(_Part(name, _repeated(run, times), times) for name, (run, times) in one.timed().items()),
         _Part("policy, image to action", act, 20),
         _Part(f"policy, batch of {_ENVS}, per image", lambda: policy.act(many.observation()), _ENVS),
         _Part(f"environment, {_ENVS} at a time, per step", environment, 10 * _ENVS, time.perf_counter),
     ]
+
+
+def _repeated(run: Callable[[], object], times: int) -> Callable[[], object]:
+    def repeat() -> None:
+        for _ in range(times):
+            run()
+
+    return repeat

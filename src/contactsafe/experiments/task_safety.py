@@ -1,68 +1,110 @@
-"""Task safety: the policy wipes held-out boards; how hard does the tool press, and does it wipe as well?"""
+"""Task safety: the policy works on held-out episodes; how strongly does the tool press, and does it work as well?"""
+
+from collections.abc import Sequence
 
 import numpy as np
 
-from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.results import Experiment, Recording, Trial
-from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
-from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.experiments.run import policy_for, run_policy
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.figures import Figure, Panel, component, length
+from contactsafe.results.metrics import CONTACT_N, Aim, Highlight, Metric
+from contactsafe.results.recording import Recording
 
+NAME = "task-safety"
 QUESTION = (
-    "The policy wipes boards it has never seen: does the tool press gently, and does contact safety cost any ink?"
+    "The policy works on episodes it has never seen: does the tool press gently, and does contact safety cost any "
+    "success?"
 )
-SCENARIO = "wiping"
-_TOUCHING_N = 0.5  # pad force above which a tick counts as contact
+METRICS = (
+    Metric("tool_force_peak_n", "tool force, peak", "N", main=True, aim=Aim(at_most=40.0, always=True)),
+    Metric("tool_force_median_n", "tool force, median in contact", "N", main=True, aim=Aim(at_most=10.0, at_least=2.0)),
+    Metric("tool_force_p95_n", "tool force, 95th percentile in contact", "N"),
+    Metric("landing_peak_n", "tool force, peak on landing", "N", aim=Aim(at_most=20.0)),
+    Metric("stiffness_z_free", "stiffness along z, in the air", "1/s²"),
+    Metric("stiffness_z_contact", "stiffness along z, in contact", "1/s²"),
+    Metric("damping_z_free", "damping along z, in the air", "1/s"),
+    Metric("damping_z_contact", "damping along z, in contact", "1/s"),
+)
+FORCES = tuple(
+    Panel(f"tool force, {axis}", "N", component("tool_force", i), noisy=True) for i, axis in enumerate("xyz")
+)
+_FORCE = Panel("force on the tool", "N", length("tool_force"))
+IMPEDANCE = Figure(
+    plots=(
+        (
+            _FORCE,
+            Panel("stiffness K1 along z", "1/s²", component("K_task", 2)),
+            Panel("stiffness K1 along x", "1/s²", component("K_task", 0)),
+        ),
+        (
+            _FORCE,
+            Panel("damping D1 along z", "1/s", component("D_task", 2)),
+            Panel("damping D1 along x", "1/s", component("D_task", 0)),
+        ),
+    ),
+    caption=f"What the policy does with its impedance. Shaded: contact, above {CONTACT_N} N.",
+    shaded=lambda run: _FORCE.curve(run) > CONTACT_N,
+    one_controller=True,
+)
+
 _LANDING_TICKS = 200  # after the first of them
 _Z = 2
 
 
-def task_safety(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
-    """Run the experiment; the board with the most ink is recorded.
+def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+    """Run the experiment; the episode whose first picture shows most is recorded.
 
     Args:
-        bundle: loaded `Bundle`.
-        config: controllers and seeds.
+        config: controllers, seeds, task and policy bundle.
         progress: told of every trial done.
     """
+    task, bundle = config.require_task(), config.require_bundle()
     trials: list[Trial] = []
     recordings: list[Recording] = []
-    fullest: Recording | None
     for name in config.controllers:
-        most, fullest = 0, None  # ink, recording
+        most, fullest = 0, None  # cells, recording
         for seeds in config.batches():
-            tasks = WipingTasks(WipingConfig(controller=name), len(seeds), list(seeds))
+            episodes = task.episodes(name, seeds)
+            run = run_policy(episodes, policy_for(bundle, episodes).act, episodes.step_limit, to_the_end=False)
             for i, seed in enumerate(seeds):
-                tasks.reset(i, held_out(seed))
-            ink = tasks.tasks["ink_start"].copy()
-            policy = policy_for(bundle, tasks)
-            run = run_policy(tasks, policy.act, tasks.step_limit, stop_when_clean=True)
-            for i, seed in enumerate(seeds):
-                trials.append(Trial(SCENARIO, name, seed, wiping_metrics(run.traces[i], run.clean[i])))
-            i = int(np.argmax(ink))
-            if ink[i] > most:  # all controllers get the same boards, so it is the same one of each
-                most, fullest = ink[i], run.recording(i, SCENARIO, name, seeds[i])
-            tasks.worlds.close()
+                outcome = task.outcome(run.traces[i], run.curves[i], bool(run.succeeded[i]))
+                trials.append(Trial(task.name, name, seed, outcome | force_metrics(run.traces[i])))
+            cells = np.count_nonzero(run.pictures[0], axis=(1, 2))
+            i = int(np.argmax(cells))
+            if cells[i] > most or fullest is None:  # all controllers get the same episodes: the same one of each
+                most, fullest = cells[i], run.recording(i, task.name, name, seeds[i])
+            episodes.worlds.close()
             if progress:
                 progress(len(seeds))
         if fullest is not None:
             recordings.append(fullest)
-    return Experiment("task-safety", QUESTION, tuple(trials), tuple(recordings))
+    return Experiment(
+        NAME,
+        "Task safety",
+        QUESTION,
+        trials=tuple(trials),
+        metrics=(*task.metrics, *METRICS),
+        highlights=(*task.highlights, Highlight(task.name, "tool_force_peak_n", "Peak force of the tool")),
+        recordings=tuple(recordings),
+        figures=(curves(task.panels), IMPEDANCE),
+        stage=task.stage,
+        policy=task.policy,
+    )
 
 
-def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
-    """Summarise one episode of wiping.
+ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, needs_policy=True)
+
+
+def force_metrics(trace: np.ndarray) -> dict[str, float]:
+    """Summarise forces and impedance of one episode.
 
     Args:
         trace: `trace_dtype` records, (T,).
-        clean: whether the board ended clean.
     """
     force = np.linalg.norm(trace["tool_force"], axis=1)
-    touching = force > _TOUCHING_N
+    touching = force > CONTACT_N
     return {
-        "ink_removed": float(1.0 - trace["ink_left"][-1]),
-        "clean": float(clean),
-        "time_s": float(trace["time"][-1]) if clean else float("nan"),
         "tool_force_peak_n": float(force.max()),
         "tool_force_median_n": float(np.median(force[touching])) if touching.any() else float("nan"),
         "landing_peak_n": landing_peak(force, touching),
@@ -75,11 +117,20 @@ def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
     }
 
 
+def curves(of_task: Sequence[Panel]) -> Figure:
+    """Return the figure of the tool's force and of the task's own curves."""
+    labels = "".join(f"; {panel.label}" for panel in of_task)
+    return Figure(
+        plots=tuple((panel,) for panel in (*FORCES, *of_task)),
+        caption=f"Force on the tool along the world's axes, mean and, pale, range{labels}.",
+    )
+
+
 def landing_peak(force: np.ndarray, touching: np.ndarray) -> float:
-    """Give the largest force within 0.2 s of the first touch, N; NaN where nothing was touched.
+    """Return the largest force within 0.2 s of the first touch, N; NaN where nothing was touched.
 
     Args:
-        force: of the board on the tool, tick by tick, (T,), N.
+        force: on the tool, tick by tick, (T,), N.
         touching: which ticks count as contact, (T,).
     """
     if not touching.any():

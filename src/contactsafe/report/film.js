@@ -1,5 +1,5 @@
 "use strict";
-// Plays recorded runs side by side: the arm from its joint positions, the board, the obstacle, the force.
+// Plays recorded runs side by side: the arm from its joint positions, what lies before it, the obstacle, the force.
 
 (() => {
   const decode = (text, Kind) => new Kind(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
@@ -36,7 +36,7 @@
     return out;
   }
 
-  // One run: its channels by frame, its board by time.
+  // One run: its channels by frame, the pictures of its surface by time.
   class Run {
     constructor(film, run) {
       Object.assign(this, run);
@@ -47,8 +47,10 @@
       this.canvas = document.createElement("canvas");
       [this.canvas.height, this.canvas.width] = run.cells;
       this.codes = new Uint16Array(run.cells[0] * run.cells[1]);
-      const runs = decode(run.ink, Uint16Array);
-      for (let i = 0, at = 0; i < runs.length; at += runs[i + 1], i += 2) this.codes.fill(runs[i], at, at + runs[i + 1]);
+      this.runs = run.pictures ? decode(run.pictures, Uint16Array) : [];
+      this.starts = [];
+      for (let i = 0, at = 0; i < this.runs.length; at += this.runs[i + 1], i += 2)
+        if (at % this.codes.length === 0) this.starts.push(i);
       this.shown = -1;
     }
     at(time) {
@@ -57,22 +59,26 @@
       return {
         q: Array.from(v.subarray(0, n), (x) => x * u.q),
         obstacle: Array.from(v.subarray(n, n + 3), (x) => x * u.position),
-        force: v[n + 3] * u.force, mode: v[n + 4], holding: v[n + 5], link: v[n + 6],
+        force: v[n + 3] * u.force, mode: v[n + 4], rejects: v[n + 5], link: v[n + 6],
       };
     }
     force(frame) {
       return this.values[frame * this.width + this.joints + 3] * this.film.units.force;
     }
-    board(time) {
-      const index = Math.floor(time * this.boardHz + 1e-6);
+    // Pictures follow each other: a code of 0 leaves a cell as it was, another is its value + 1.
+    change(index) {
+      const N = this.codes.length;
+      for (let i = this.starts[index], at = 0; at < N; at += this.runs[i + 1], i += 2)
+        if (this.runs[i]) this.codes.fill(this.runs[i], at, at + this.runs[i + 1]);
+    }
+    picture(time) {
+      const index = Math.min(Math.floor(time * this.pictureHz + 1e-6), this.starts.length - 1);
       if (index === this.shown) return this.canvas;
+      for (let k = index < this.shown ? 0 : this.shown + 1; k <= index; k++) this.change(k);
       this.shown = index;
       const context = this.canvas.getContext("2d"), image = context.createImageData(this.canvas.width, this.canvas.height);
-      const { ink, object } = this.film.board;
-      this.codes.forEach((code, i) => {
-        if (code === 0 || (code > 1 && code < 65535 && index >= code - 2)) return;
-        image.data.set([...(code === 1 ? object : ink), 255], 4 * i);
-      });
+      const colours = this.film.surface.colours;
+      this.codes.forEach((code, i) => colours[code - 1] && image.data.set([...colours[code - 1], 255], 4 * i));
       context.putImageData(image, 0, 0);
       return this.canvas;
     }
@@ -119,7 +125,7 @@
       this.drawSpark(time, style);
       this.bar.style.width = `${Math.min(100, (100 * now.force) / this.scene.limit)}%`;
       this.value.textContent = `${now.force.toFixed(now.force < 9.95 ? 1 : 0)} N`;
-      const names = now.holding ? "holds against" : "yields to";
+      const names = now.rejects ? "rejects" : "complies with";
       this.state.textContent = now.mode ? `${names} contact, link ${now.link || "–"}` : "free-space law";
       this.state.classList.toggle("on", now.mode !== 0);
     }
@@ -150,21 +156,21 @@
         c.stroke();
       };
 
-      // Board and ink: columns of the image run along y, rows along x.
-      const corners = this.film.board.corners.map(project), board = this.run.board(time);
+      // The surface and what lies on it: columns of the image run along y, rows along x.
+      const corners = this.film.surface.corners.map(project), lying = this.run.picture(time);
       c.lineWidth = 1;
       c.strokeStyle = style.edge;
-      outline(corners, style.board);
+      outline(corners, style.surface);
       c.save();
       c.setTransform(
-        ratio * (corners[3][0] - corners[0][0]) / board.width, ratio * (corners[3][1] - corners[0][1]) / board.width,
-        ratio * (corners[1][0] - corners[0][0]) / board.height, ratio * (corners[1][1] - corners[0][1]) / board.height,
+        ratio * (corners[3][0] - corners[0][0]) / lying.width, ratio * (corners[3][1] - corners[0][1]) / lying.width,
+        ratio * (corners[1][0] - corners[0][0]) / lying.height, ratio * (corners[1][1] - corners[0][1]) / lying.height,
         ratio * corners[0][0], ratio * corners[0][1],
       );
-      c.drawImage(board, 0, 0);
+      c.drawImage(lying, 0, 0);
       c.restore();
 
-      const frames = kinematics(this.film.arm, now.q), floor = this.film.board.corners[0][2];
+      const frames = kinematics(this.film.arm, now.q), floor = this.film.surface.corners[0][2];
       const place = (frame, p) => add(frames[frame].p, apply(frames[frame].R, p));
       const capsules = this.film.arm.capsules.map((capsule) => ({
         a: place(capsule.frame, capsule.start), b: place(capsule.frame, capsule.end), r: capsule.radius * scale, frame: capsule.frame,
@@ -200,17 +206,17 @@
           line([p[0], p[1] - 0.28 * r], [q[0], q[1] - 0.28 * r], r, style.shine);
         }];
       });
-      const pad = this.film.arm.pad;
-      if (pad) {
+      const block = this.film.arm.block;
+      if (block) {
         const box = [];
         for (const i of [-1, 1]) for (const j of [-1, 1]) for (const k of [-1, 1])
-          box.push(project(place(frames.length - 1, add(pad.centre, [i * pad.half[0], j * pad.half[1], k * pad.half[2]]))));
+          box.push(project(place(frames.length - 1, add(block.centre, [i * block.half[0], j * block.half[1], k * block.half[2]]))));
         const faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
           .map((face) => face.map((i) => box[i])).sort((a, b) => depth(a) - depth(b)).slice(3);
         things.push([depth(box), () => {
           c.lineWidth = 1;
           c.strokeStyle = style.edge;
-          faces.forEach((face) => outline(face, style.pad));
+          faces.forEach((face) => outline(face, style.block));
         }]);
       }
       if (this.run.obstacle) {
@@ -278,7 +284,7 @@
     const css = getComputedStyle(film);
     const read = (name) => css.getPropertyValue(name).trim();
     const style = { font: css.fontFamily, controller: {} };
-    for (const name of ["edge", "arm", "shine", "board", "pad", "obstacle", "text"]) style[name] = read(`--${name}`);
+    for (const name of ["edge", "arm", "shine", "surface", "block", "obstacle", "text"]) style[name] = read(`--${name}`);
     for (const name of names) style.controller[name] = read(variable(name)) || style.text;
     return style;
   }

@@ -3,63 +3,68 @@
 import base64
 import json
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.report import data
-from contactsafe.report.data import Experiment, Recording
-from contactsafe.report.scene import INK, INK_RGB, OBJECT, OBJECT_RGB, Subject, fit
+from contactsafe.report.scene import fit
+from contactsafe.results.experiment import Experiment
+from contactsafe.results.metrics import CONTACT_N
+from contactsafe.results.recording import Recording, Stage
 from contactsafe.robot.description import Capsule, Quaternion, Vector3
 
 FRAMES_HZ = 60
+"""Frames of the film a second: those of a screen."""
+
 Q_UNIT, POSITION_UNIT, FORCE_UNIT = 2e-4, 1e-4, 0.05
 """rad, m and N of one step of the film's integers."""
 
-_EMPTY, _LAID, _GONE_AT, _STAYS = 0, 1, 2, 65535
-"""A cell of the board: never inked; covered by the object; clean from frame (code − 2) on; never cleaned."""
+_UNCHANGED = 0
+"""A cell of a picture that is as in the one before; others hold their value + 1."""
 
-_FORCES = {"obstacle": "contact force", "tool": "tool force"}
+_LONGEST = 65535  # cells in a row that one pair of numbers stands for
 
 
-def film_json(experiment: Experiment, subject: Subject) -> str | None:
-    """Write the film of an experiment's recordings as JSON for film.js; None where nothing was recorded.
+def film_json(experiment: Experiment, stage: Stage) -> str | None:
+    """Return the film of an experiment's recordings as JSON for film.js; None where nothing was recorded.
 
     Args:
         experiment: with recordings.
-        subject: arm and board.
+        stage: arm, tool and surface.
     """
-    scenes = [_scene(subject, name, data.recorded(experiment, name)) for name in data.scenarios(experiment)]
+    scenes = [_scene(stage, name, data.recorded(experiment, name)) for name in data.scenarios(experiment)]
     scenes = [scene for scene in scenes if scene is not None]
     if not scenes:
         return None
     film = {
         "hz": FRAMES_HZ,
         "units": {"q": Q_UNIT, "position": POSITION_UNIT, "force": FORCE_UNIT},
-        "arm": _arm(subject),
-        "board": {"corners": _rounded(subject.board_corners()), "ink": INK_RGB, "object": OBJECT_RGB},
+        "arm": _arm(stage),
+        "surface": {"corners": _rounded(stage.corners), "colours": stage.colours},
         "scenes": scenes,
     }
     return json.dumps(film, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def first_contact(recording: Recording) -> int | None:
-    """Give the first tick at which the arm is pressed by an obstacle with 0.5 N; None where it never is."""
-    touching = recording.trace["obstacle_force"] > 0.5
+    """Return the first tick at which an obstacle presses the arm; None where none ever does."""
+    touching = recording.trace["obstacle_force"] > CONTACT_N
     return int(np.argmax(touching)) if touching.any() else None
 
 
-def _scene(subject: Subject, name: str, recordings: list[Recording]) -> dict | None:
+def _scene(stage: Stage, name: str, recordings: list[Recording]) -> dict | None:
     if not recordings:
         return None
-    view = fit(subject, recordings)
-    of = "obstacle" if any(recording.obstacle for recording in recordings) else "tool"
-    runs = [_run(recording, of) for recording in recordings]
+    view = fit(stage, recordings)
+    of_obstacle = any(recording.obstacle for recording in recordings)
+    runs = [_run(recording, of_obstacle) for recording in recordings]
     contacts = [tick for recording in recordings if (tick := first_contact(recording)) is not None]
     return {
         "name": name,
-        "force": _FORCES[of],
-        "limit": max(1.0, *(_force(recording, of).max() for recording in recordings)),
+        "force": "contact force" if of_obstacle else "tool force",
+        "limit": max(1.0, *(force(recording, of_obstacle).max() for recording in recordings)),
         "start": round(min(contacts) / 1000 + 0.3, 3) if contacts else 0.0,
         "target": _rounded(view.target),
         "span": _rounded(view.span),
@@ -69,17 +74,17 @@ def _scene(subject: Subject, name: str, recordings: list[Recording]) -> dict | N
     }
 
 
-def _run(recording: Recording, of: str) -> dict:
+def _run(recording: Recording, of_obstacle: bool) -> dict:
     trace = recording.trace
     count = max(1, math.floor(len(trace) * FRAMES_HZ / 1000))
     edges = np.minimum(np.round(np.arange(count + 1) * 1000 / FRAMES_HZ).astype(int), len(trace))
     ticks = edges[:-1]
-    force = np.maximum.reduceat(_force(recording, of), ticks)  # the largest of a frame: no peak is lost
+    forces = np.maximum.reduceat(force(recording, of_obstacle), ticks)  # the largest of a frame: no peak is lost
     channels = np.column_stack(
         [
             trace["q"][ticks] / Q_UNIT,
             trace["obstacle_position"][ticks, 0] / POSITION_UNIT,
-            force / FORCE_UNIT,
+            forces / FORCE_UNIT,
             trace["mode"][ticks],
             trace["holding"][ticks],
             trace["link"][ticks],
@@ -90,38 +95,40 @@ def _run(recording: Recording, of: str) -> dict:
         "frames": count,
         "channels": _encoded(np.clip(np.round(channels), -32768, 32767).astype("<i2")),
         "obstacle": _rounded(recording.obstacle) if recording.obstacle else None,
-        "boardHz": round(1000 / recording.board_every, 6),
-        "cells": list(recording.boards.shape[1:]),
-        "ink": _encoded(_ink_runs(recording.boards)),
+        "pictureHz": round(1000 / recording.picture_every, 6),
+        "cells": [1, 1] if recording.pictures is None else list(recording.pictures.shape[1:]),
+        "pictures": None if recording.pictures is None else _encoded(picture_runs(recording.pictures)),
     }
 
 
-def _force(recording: Recording, of: str) -> np.ndarray:
-    if of == "obstacle":
+def force(recording: Recording, of_obstacle: bool) -> np.ndarray:
+    """Return the force of the obstacle on the arm, or of the task on the tool, (T,), N."""
+    if of_obstacle:
         return recording.trace["obstacle_force"]
     return np.linalg.norm(recording.trace["tool_force"], axis=1)
 
 
-def _ink_runs(boards: np.ndarray) -> np.ndarray:
-    """Code the fate of every cell of the boards (F, rows, columns), as pairs of code and number of cells in a row."""
-    has = boards == INK
-    last = len(boards) - 1 - np.argmax(has[::-1], axis=0)
-    gone = np.where(last == len(boards) - 1, _STAYS, last + 1 + _GONE_AT)
-    cells = np.where(has.any(axis=0), gone, _EMPTY)
-    cells = np.where((boards == OBJECT).any(axis=0), _LAID, cells).ravel()
-    starts = np.flatnonzero(np.diff(cells, prepend=-1))
-    lengths = np.diff(starts, append=len(cells))
+def picture_runs(pictures: np.ndarray) -> np.ndarray:
+    """Return pictures, (F, rows, columns), as pairs of a code and of how many cells in a row have it.
+
+    Each picture follows the one before it: 0 stands for a cell that is as it was, else the code is its value + 1.
+    """
+    flat = pictures.reshape(len(pictures), -1).astype(int) + 1
+    codes = np.concatenate([flat[:1], np.where(flat[1:] == flat[:-1], _UNCHANGED, flat[1:])])
     runs: list[int] = []
-    for value, length in zip(cells[starts].tolist(), lengths.tolist(), strict=True):
-        while length > 0:
-            runs += [value, min(length, 65535)]
-            length -= 65535
+    for row in codes:
+        starts = np.flatnonzero(np.diff(row, prepend=-1))
+        lengths = np.diff(starts, append=len(row))
+        for code, length in zip(row[starts].tolist(), lengths.tolist(), strict=True):
+            while length > 0:
+                runs += [code, min(length, _LONGEST)]
+                length -= _LONGEST
     return np.array(runs, dtype="<u2")
 
 
-def _arm(subject: Subject) -> dict:
-    """Frames, each in the one before it, and what is fixed to them, for the film's own forward kinematics."""
-    arm, tool = subject.arm, subject.tool
+def _arm(stage: Stage) -> dict:
+    """Return frames, each in the one before it, and what is fixed to them, for the film's own forward kinematics."""
+    arm, tool = stage.arm, stage.tool
     frames = [_frame(link.position, link.quat) for link in arm.links] + [_frame(arm.mount_position, arm.mount_quat)]
     groups: tuple[tuple[Capsule, ...], ...] = (arm.base_capsules, *(link.capsules for link in arm.links), tool.capsules)
     capsules = [
@@ -129,11 +136,11 @@ def _arm(subject: Subject) -> dict:
         for owner, group in enumerate(groups)
         for capsule in group
     ]
-    pad = None
-    if tool.tip.half_size is not None:
+    block = None
+    if tool.tip is not None:
         x, y, z = tool.tcp
-        pad = {"centre": (x, y, z - tool.tip.half_size[2]), "half": tool.tip.half_size}
-    return {"frames": frames, "capsules": capsules, "pad": pad}
+        block = {"centre": (x, y, z - tool.tip.half_size[2]), "half": tool.tip.half_size}
+    return {"frames": frames, "capsules": capsules, "block": block}
 
 
 def _frame(position: Vector3, quat: Quaternion) -> dict:
@@ -144,5 +151,5 @@ def _encoded(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode()
 
 
-def _rounded(values) -> list:
+def _rounded(values: Sequence | np.ndarray) -> list:
     return np.round(np.asarray(values, dtype=float), 5).tolist()

@@ -10,7 +10,7 @@ from contactsafe.core.files import replace
 _REMEDY = "give a folder you may write to with --out"
 
 
-def prepare_output(folder) -> Path:
+def prepare_output(folder: str | Path) -> Path:
     """Make the folder that results go to and make sure that it can be written; call it before long work.
 
     Args:

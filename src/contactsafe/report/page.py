@@ -7,12 +7,13 @@ from string import Template
 from typing import Any
 
 from contactsafe.report import data
-from contactsafe.report.data import Experiment, RunInfo
+from contactsafe.report.data import RunInfo
 from contactsafe.report.output import prepare_output, write_whole
 from contactsafe.report.summary import trials_csv, write_summary
+from contactsafe.results.experiment import Experiment
 
 
-def write_report(folder, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
+def write_report(folder: str | Path, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
     """Write `report.html`, `summary.json` and every experiment's trials as CSV.
 
     Args:
@@ -35,7 +36,7 @@ def write_report(folder, experiments: Sequence[Experiment], info: RunInfo | Mapp
 
 
 def render(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> str:
-    """Give the page as text."""
+    """Return the page as text."""
     from contactsafe.report import sections  # brings matplotlib, which the other commands need not wait for
 
     names = data.controllers(experiments)

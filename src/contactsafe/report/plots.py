@@ -3,22 +3,21 @@
 import io
 import itertools
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from contactsafe.report import data
-from contactsafe.report.data import Experiment, Recording
+from contactsafe.results.experiment import Experiment
+from contactsafe.results.figures import Curve, Panel
+from contactsafe.results.recording import Recording
 
-Curve = Callable[[Recording], np.ndarray]
-"""From a recording to one value a tick, (T,)."""
-
-_INK, _GRID, _BAND = "#010203", "#010204", "#010205"
+_TEXT, _GRID, _BAND = "#010203", "#010204", "#010205"
 _BINS = 240
 _WIDTH_IN = {3: 3.5, 2: 5.4}  # inches, by columns of the page: all are shown at one scale, and so is their type
 _ALONE_IN, _PANEL_IN, _NAME_IN = 1.8, 1.15, 0.16  # inches: height of a lone panel, of one of several, of a line of text
@@ -27,37 +26,22 @@ _STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "contactsafe",
     "font.size": 9,
-    "axes.edgecolor": _INK,
-    "axes.labelcolor": _INK,
+    "axes.edgecolor": _TEXT,
+    "axes.labelcolor": _TEXT,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.titlesize": 9,
     "axes.titlepad": 4,
     "axes.titlelocation": "left",
-    "text.color": _INK,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
+    "text.color": _TEXT,
+    "xtick.color": _TEXT,
+    "ytick.color": _TEXT,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "grid.color": _GRID,
     "grid.linewidth": 0.5,
 }
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes.
-
-    Attributes:
-        label: of what is drawn, with its unit.
-        curve: what is drawn.
-        noisy: draw the mean as a line and what it scatters as a pale band.
-    """
-
-    label: str
-    curve: Curve
-    noisy: bool = False
 
 
 class Plotter:
@@ -80,14 +64,14 @@ class Plotter:
         only: str | None = None,
         columns: int = 2,
     ) -> str:
-        """Draw panels under each other, one curve a controller, named at its end.
+        """Plot panels under each other, one curve a controller, named at its end.
 
         Args:
-            experiment: whose recordings are drawn.
+            experiment: whose recordings are plotted.
             scenario: which of them.
-            panels: what to draw, from top to bottom.
+            panels: what to plot, from top to bottom.
             bands: spans of time to be shaded, s.
-            only: the controller to draw; all where None.
+            only: the controller to plot; all where None.
             columns: of the page that the plot is one of, 2 or 3.
 
         Returns:
@@ -106,10 +90,12 @@ class Plotter:
             axes[-1].set_xlabel("time (s)")
             buffer = io.StringIO()
             figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-        return self._inline(buffer.getvalue(), f"{scenario}: {', '.join(panel.label for panel in panels)} over time")
+        return self._inline(buffer.getvalue(), f"{scenario}: {', '.join(panel.title for panel in panels)} over time")
 
-    def _panel(self, axis, recordings: Sequence[Recording], panel: Panel, bands: Sequence[tuple[float, float]]) -> None:
-        axis.set_title(panel.label)
+    def _panel(
+        self, axis: Axes, recordings: Sequence[Recording], panel: Panel, bands: Sequence[tuple[float, float]]
+    ) -> None:
+        axis.set_title(panel.title)
         axis.grid(axis="y")
         axis.set_axisbelow(True)
         axis.locator_params(axis="y", nbins=4)
@@ -127,7 +113,7 @@ class Plotter:
         if axis.dataLim.ymin >= 0:
             axis.set_ylim(bottom=0)
 
-    def _name_curves(self, axis, recordings: Sequence[Recording], curve: Curve) -> None:
+    def _name_curves(self, axis: Axes, recordings: Sequence[Recording], curve: Curve) -> None:
         """Write each controller's name at the right, as high as its curve ends, or as where the curves differ most."""
         low, high = axis.get_ylim()
         curves = [curve(recording) for recording in recordings]
@@ -160,7 +146,7 @@ class Plotter:
         svg = re.sub(r'href="#', f'href="#{prefix}', svg)
         svg = svg.replace("url(#", f"url(#{prefix}")
         svg = re.sub(r"(\d+\.\d\d)\d+", r"\1", svg)
-        for token, style in {_INK: "currentColor", _GRID: "var(--grid)", _BAND: "var(--band)"}.items():
+        for token, style in {_TEXT: "currentColor", _GRID: "var(--grid)", _BAND: "var(--band)"}.items():
             svg = svg.replace(token, style)
         for name, token in self._tokens.items():
             svg = svg.replace(token, f"var({data.css_variable(name)})")
@@ -204,12 +190,12 @@ def scatter(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def spans(times: np.ndarray, active: np.ndarray, gap_s: float = 0.02) -> list[tuple[float, float]]:
-    """Give the spans of time in which something is so, each to the sample after its last; near ones are one.
+    """Return the spans of time in which something is so, each to the sample after its last; near ones are one.
 
     Args:
         times: (T,), s.
         active: whether it is so, (T,).
-        gap_s: largest gap between two spans that are drawn as one, s.
+        gap_s: largest gap between two spans that count as one, s.
     """
     found: list[tuple[float, float]] = []
     ends = np.append(times[1:], times[-1:])

@@ -1,46 +1,19 @@
-"""The simulated scene as a picture: a camera at infinity, so that capsules stay capsules and the board stays affine."""
+"""The simulated scene as a picture: a camera at infinity, so that capsules stay capsules and a surface stays affine."""
 
 import base64
 import io
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.report.data import Recording
-from contactsafe.robot.description import ArmDescription, Tool
+from contactsafe.results.recording import Colour, Recording, Stage
 from contactsafe.robot.shape import arm_capsules, tip_box
-from contactsafe.sim.config import BoardConfig
-
-INK, OBJECT = 1, 2
-"""What a board's cell may hold besides nothing."""
-
-INK_RGB, OBJECT_RGB = (24, 48, 104), (20, 20, 22)
 
 _AZIMUTH, _ELEVATION = math.radians(22.0), math.radians(22.0)
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
-
-
-@dataclass(frozen=True)
-class Subject:
-    """What is filmed: an arm with its tool, over a board.
-
-    Attributes:
-        arm: its info.
-        tool: what it carries.
-        board: the whiteboard.
-    """
-
-    arm: ArmDescription
-    tool: Tool
-    board: BoardConfig
-
-    def board_corners(self) -> np.ndarray:
-        """Corners of the board in the order of the outline, world, (4, 3), m."""
-        x, y, z = self.board.centre
-        dx, dy = self.board.size[0] / 2, self.board.size[1] / 2
-        return np.array([(x - dx, y - dy, z), (x + dx, y - dy, z), (x + dx, y + dy, z), (x - dx, y + dy, z)])
 
 
 @dataclass(frozen=True)
@@ -50,7 +23,7 @@ class View:
     Attributes:
         target: world point in the middle of the picture, m.
         span: width and height that the picture must show, m.
-        azimuth: of the camera about z, rad; 0 looks at the robot's face.
+        azimuth: of the camera about z, rad; 0 looks at the robot from the front.
         elevation: of the camera above the table, rad.
     """
 
@@ -60,16 +33,16 @@ class View:
     elevation: float = _ELEVATION
 
     def axes(self) -> np.ndarray:
-        """Rows: right, up, towards the camera; world, (3, 3)."""
+        """Return the rows right, up, towards the camera; world, (3, 3)."""
         ca, sa, ce, se = (f(x) for x in (self.azimuth, self.elevation) for f in (math.cos, math.sin))
         return np.array([(-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)])
 
     def scale(self, width: float, height: float) -> float:
-        """Pixels a metre in a picture of that size."""
+        """Return pixels a metre in a picture of that size."""
         return min(width / self.span[0], height / self.span[1])
 
-    def project(self, points, width: float, height: float) -> np.ndarray:
-        """Give pixel x, pixel y (down) and nearness, m, of world points (…, 3)."""
+    def project(self, points: Sequence | np.ndarray, width: float, height: float) -> np.ndarray:
+        """Return pixel x, pixel y (down) and nearness, m, of world points (…, 3)."""
         relative = (np.asarray(points) - self.target) @ self.axes().T
         scale = self.scale(width, height)
         relative[..., 0] = width / 2 + scale * relative[..., 0]
@@ -77,12 +50,12 @@ class View:
         return relative
 
 
-def fit(subject: Subject, recordings: list[Recording]) -> View:
-    """Choose the view in which the arm of all recordings, the board and the obstacle are seen."""
-    spheres = [(subject.board_corners(), 0.0)]  # everything seen lies within these: centres (…, 3), m, and radius, m
+def fit(stage: Stage, recordings: list[Recording]) -> View:
+    """Choose the view in which the arm of all recordings, the surface and the obstacle are seen."""
+    spheres = [(np.array(stage.corners), 0.0)]  # everything seen lies within these: centres (…, 3), m, and radius, m
     for recording in recordings:
         q = recording.trace["q"][:: max(1, len(recording.trace) // 60)]
-        starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
+        starts, ends, radii, _ = arm_capsules(stage.arm, stage.tool, q)
         for k, radius in enumerate(radii):
             spheres += [(starts[:, k], radius), (ends[:, k], radius)]
         if recording.obstacle is not None:
@@ -95,38 +68,36 @@ def fit(subject: Subject, recordings: list[Recording]) -> View:
     return View((float(target[0]), float(target[1]), float(target[2])), (float(width), float(height)))
 
 
-def picture(subject: Subject, view: View, recording: Recording, tick: int, width: int, height: int) -> str:
-    """Draw one moment as SVG without its outer element; colours come from the page's style.
+def picture(stage: Stage, view: View, recording: Recording, tick: int, width: int, height: int) -> str:
+    """Return one moment as SVG without its outer element; colours come from the page's style.
 
     Args:
-        subject: arm and board.
+        stage: arm, tool and surface.
         view: of `fit`.
         recording: what happened.
         tick: index into its trace.
         width, height: of the picture, px.
     """
     scale = view.scale(width, height)
-    board = recording.boards[min(tick // recording.board_every, len(recording.boards) - 1)]
-    corners = view.project(subject.board_corners(), width, height)
-    parts = [f'<polygon class="board" points="{_points(corners)}"/>', _ink(board, corners)]
+    corners = view.project(stage.corners, width, height)
+    parts = [f'<polygon class="surface" points="{_points(corners)}"/>']
+    lying = recording.picture(tick)
+    if lying is not None:
+        parts.append(_image(lying, stage.colours, corners))
     q = recording.trace["q"][tick : tick + 1]
-    starts, ends, radii, _ = arm_capsules(subject.arm, subject.tool, q)
-    flat = [
-        np.stack([x[0, :, 0], x[0, :, 1], np.full(len(radii), subject.board.centre[2])], axis=1) for x in (starts, ends)
-    ]
+    starts, ends, radii, _ = arm_capsules(stage.arm, stage.tool, q)
+    floor = np.full(len(radii), stage.corners[0][2])
+    flat = [np.stack([x[0, :, 0], x[0, :, 1], floor], axis=1) for x in (starts, ends)]
     shadow = [view.project(x, width, height) for x in flat]
     parts.append(
         '<g class="shadow">'
         + "".join(_line(a, b, 2 * scale * r) for a, b, r in zip(*shadow, radii, strict=True))
         + "</g>"
     )
-    things: list[tuple[float, str]] = []
-    for a, b, r in zip(
-        view.project(starts[0], width, height), view.project(ends[0], width, height), radii, strict=True
-    ):
-        things.append(((a[2] + b[2]) / 2, _capsule(a, b, scale * r)))
-    if subject.tool.tip.half_size is not None:
-        centre, half, rotation = tip_box(subject.arm, subject.tool, q)
+    projected = [view.project(x[0], width, height) for x in (starts, ends)]
+    things = [((a[2] + b[2]) / 2, _capsule(a, b, scale * r)) for a, b, r in zip(*projected, radii, strict=True)]
+    if stage.tool.tip is not None:
+        centre, half, rotation = tip_box(stage.arm, stage.tool, q)
         box = view.project(centre[0] + (_CORNERS * half) @ rotation[0].T, width, height)
         things.append((box[:, 2].mean(), _box(box)))
     if recording.obstacle is not None:
@@ -138,16 +109,16 @@ def picture(subject: Subject, view: View, recording: Recording, tick: int, width
     return "".join(parts)
 
 
-def _ink(board: np.ndarray, corners: np.ndarray) -> str:
-    """Ink and object as an image, mapped onto the board: columns along y, rows along x."""
+def _image(cells: np.ndarray, colours: Mapping[int, Colour], corners: np.ndarray) -> str:
+    """Return what lies on the surface as an image, mapped onto it: columns along y, rows along x."""
     from matplotlib.image import imsave  # the heavy part of this room, wanted only where something is drawn
 
-    rgba = np.zeros((*board.shape, 4), dtype=np.uint8)
-    for value, rgb in ((INK, INK_RGB), (OBJECT, OBJECT_RGB)):
-        rgba[board == value] = (*rgb, 255)
+    rgba = np.zeros((*cells.shape, 4), dtype=np.uint8)
+    for value, rgb in colours.items():
+        rgba[cells == value] = (*rgb, 255)
     buffer = io.BytesIO()
     imsave(buffer, rgba, format="png")
-    rows, columns = board.shape
+    rows, columns = cells.shape
     right, down = (corners[3] - corners[0])[:2] / columns, (corners[1] - corners[0])[:2] / rows
     matrix = " ".join(f"{x:.5g}" for x in (*right, *down, *corners[0, :2]))
     data = base64.b64encode(buffer.getvalue()).decode()
@@ -178,11 +149,11 @@ def _capsule(a: np.ndarray, b: np.ndarray, radius: float) -> str:
 
 def _box(corners: np.ndarray) -> str:
     nearest = sorted(_FACES, key=lambda face: corners[list(face), 2].mean())[3:]
-    return "".join(f'<polygon class="pad" points="{_points(corners[list(face)])}"/>' for face in nearest)
+    return "".join(f'<polygon class="block" points="{_points(corners[list(face)])}"/>' for face in nearest)
 
 
 def _obstacle(centre: np.ndarray, shape: tuple[float, float], scale: float, view: View, name: str) -> str:
-    """A sphere, or a standing cylinder of exact outline: between two ellipses."""
+    """Return a sphere, or a standing cylinder of exact outline: between two ellipses."""
     r, half = scale * shape[0], scale * shape[1] * math.cos(view.elevation)
     x, y = centre[:2]
     if half == 0:

@@ -5,23 +5,24 @@ from html import escape
 import numpy as np
 
 from contactsafe.report import data
-from contactsafe.report.data import Experiment, Recording
-from contactsafe.report.film import first_contact
-from contactsafe.report.scene import Subject, fit, picture
+from contactsafe.report.film import first_contact, force
+from contactsafe.report.scene import fit, picture
 from contactsafe.report.tables import coloured
+from contactsafe.results.experiment import Experiment
+from contactsafe.results.recording import Recording, Stage
 
 WIDTH, HEIGHT = 220, 220
 """Of one picture, px."""
 
 
-def strips(experiment: Experiment, subject: Subject) -> str:
-    """Draw one strip a recorded scenario: a row a controller, a column a moment, the force written beneath.
+def strips(experiment: Experiment, stage: Stage) -> str:
+    """Return one strip a recorded scenario: a row a controller, a column a moment, the force written beneath.
 
     Args:
         experiment: with recordings.
-        subject: arm and board.
+        stage: arm, tool and surface.
     """
-    return "\n".join(_strip(name, data.recorded(experiment, name), subject) for name in data.scenarios(experiment))
+    return "\n".join(_strip(name, data.recorded(experiment, name), stage) for name in data.scenarios(experiment))
 
 
 def moments(recordings: list[Recording]) -> list[int]:
@@ -29,26 +30,26 @@ def moments(recordings: list[Recording]) -> list[int]:
     end = max(len(recording.trace) for recording in recordings) - 1
     contacts = [tick for recording in recordings if (tick := first_contact(recording)) is not None]
     if not contacts:
-        return [round(share * end) for share in (0, 0.25, 0.5, 0.75, 1)]
+        return [round(fraction * end) for fraction in (0, 0.25, 0.5, 0.75, 1)]
     strongest = max(recordings, key=lambda recording: recording.trace["obstacle_force"].max())
     first, most = min(contacts), int(np.argmax(strongest.trace["obstacle_force"]))
     return sorted({0, first // 2, first, most, end})
 
 
-def _strip(scenario: str, recordings: list[Recording], subject: Subject) -> str:
+def _strip(scenario: str, recordings: list[Recording], stage: Stage) -> str:
     if not recordings:
         return ""
-    view = fit(subject, recordings)
+    view = fit(stage, recordings)
     ticks = moments(recordings)
     body = []
     for recording in recordings:
         cells = []
         for tick in ticks:
             at = min(tick, len(recording.trace) - 1)
-            drawn = picture(subject, view, recording, at, WIDTH, HEIGHT)
+            image = picture(stage, view, recording, at, WIDTH, HEIGHT)
             cells.append(
                 f'<td><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(recording.controller)} at '
-                f'{tick / 1000:.2f} s">{drawn}</svg>{_force(recording, at)}</td>'
+                f'{tick / 1000:.2f} s">{image}</svg>{_force(recording, at)}</td>'
             )
         body.append(
             f"<tr><th {coloured(recording.controller)}>{escape(recording.controller)}</th>{''.join(cells)}</tr>"
@@ -61,6 +62,4 @@ def _strip(scenario: str, recordings: list[Recording], subject: Subject) -> str:
 
 
 def _force(recording: Recording, tick: int) -> str:
-    row = recording.trace[tick]
-    value = row["obstacle_force"] if recording.obstacle else float(np.linalg.norm(row["tool_force"]))
-    return f"{data.number(float(value))} N"
+    return f"{data.number(float(force(recording, recording.obstacle is not None)[tick]))} N"

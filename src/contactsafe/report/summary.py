@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import contactsafe
-from contactsafe.report.data import Experiment, RunInfo
+from contactsafe.report.data import RunInfo
 from contactsafe.report.output import prepare_output, write_whole
+from contactsafe.results.experiment import Experiment
 
 PACKAGES = ("numpy", "numba", "mujoco", "onnxruntime")
 """Packages that figures may depend on."""
 
 
-def write_summary(folder, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
+def write_summary(folder: str | Path, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
     """Write `summary.json`.
 
     Args:
@@ -37,7 +38,7 @@ def write_summary(folder, experiments: Sequence[Experiment], info: RunInfo | Map
 
 
 def summarise(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> dict[str, Any]:
-    """Give what `summary.json` holds: info of the run, versions, experiments by name."""
+    """Return what `summary.json` holds: info of the run, versions, experiments by name."""
     head: dict[str, Any] = {"version": contactsafe.__version__}
     head |= {key: list(value) if isinstance(value, tuple | range) else value for key, value in info.items()}
     return head | {
@@ -47,7 +48,7 @@ def summarise(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, An
 
 
 def trials_csv(experiment: Experiment) -> str:
-    """Write the trials as CSV: a row each, a column for every metric; empty where a figure does not exist."""
+    """Return the trials as CSV: a row each, a column for every metric; empty where a figure does not exist."""
     metrics = list(dict.fromkeys(name for trial in experiment.trials for name in trial.metrics))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -60,7 +61,7 @@ def trials_csv(experiment: Experiment) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Give the versions of Python and of the packages that figures depend on."""
+    """Return the versions of Python and of the packages that figures depend on."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:

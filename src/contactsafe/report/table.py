@@ -5,14 +5,16 @@ import textwrap
 from collections.abc import Sequence
 
 from contactsafe.report import data, rows
-from contactsafe.report.data import Experiment, Spread, Table
+from contactsafe.results.experiment import Experiment, Table
+from contactsafe.results.metrics import BASELINE, ratio
+from contactsafe.results.spread import Spread
 
 _LABEL = 31
 _WIDTH = 110
 
 
 def terminal_table(experiments: Sequence[Experiment]) -> str:
-    """Write the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
+    """Return the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
 
     The last columns give the ratio of the last controller's median to the baseline's, and the aim with "ok" or "MISSED"
     where it can be judged. The experiments' own tables follow.
@@ -25,17 +27,16 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
     """
     names = data.controllers(experiments)
     subject = names[-1] if names else ""
-    table: list[list[str]] = [["median [p5, p95] over seeds", "", *names, f"{subject}/{data.BASELINE}", "aim"]]
+    table: list[list[str]] = [["median [p5, p95] over seeds", "", *names, f"{subject}/{BASELINE}", "aim"]]
     for experiment in experiments:
-        title = rows.TITLES.get(experiment.name, experiment.name)
         for heading, labelled in rows.groups(experiment, main_only=True):
-            table.append([f"{title}: {heading}"])
+            table.append([f"{experiment.title}: {heading}"])
             table += [_row(label, line, names) for label, line in labelled]
     return "\n\n".join([_align(table), *(_plain(own) for experiment in experiments for own in experiment.tables)])
 
 
 def _plain(table: Table) -> str:
-    """Write a table as it is: its first column to the left, words to the left, numbers to the right."""
+    """Return a table as it is: its first column to the left, words to the left, numbers to the right."""
     cells = [[_ascii(data.cell(value)) for value in row] for row in table.rows]
     widths = [max(map(len, column)) for column in zip(table.columns, *cells, strict=True)]
     words = [i == 0 or all(isinstance(row[i], str) for row in table.rows) for i in range(len(widths))]
@@ -49,23 +50,22 @@ def _plain(table: Table) -> str:
 
 
 def _row(label: str, line: rows.Line, names: Sequence[str]) -> list[str]:
-    row, subject = line.row, names[-1]
-    aim = row.aim_in(line.scenario)
-    verdict = {True: " ok", False: " MISSED", None: ""}[line.verdict(subject)]
+    metric, subject = line.metric, names[-1]
+    reached = {True: " ok", False: " MISSED", None: ""}[line.reaches(subject)]
     return [
         f"  {label}",
-        row.unit,
-        *(_cell(line.values.get(name), row.scale) for name in names),
-        _ascii(data.number(data.ratio(line.values.get(subject), line.baseline))),
-        _ascii(aim.text(row.unit)) + verdict if aim else "",
+        metric.unit,
+        *(_cell(line.values.get(name), metric.scale) for name in names),
+        _ascii(data.number(ratio(line.values.get(subject), line.baseline))),
+        _ascii(metric.aim.text(metric.unit)) + reached if metric.aim else "",
     ]
 
 
 def _cell(value: Spread | None, scale: float) -> str:
-    if value is None or not math.isfinite(value.median):
+    if value is None or not math.isfinite(value.middle):
         return "-"
-    median, p5, p95 = (_ascii(data.number(scale * x)) for x in (value.median, value.p5, value.p95))
-    return f"{median} [{p5}, {p95}]"
+    middle, p5, p95 = (_ascii(data.number(scale * x)) for x in (value.middle, value.p5, value.p95))
+    return f"{middle} [{p5}, {p95}]"
 
 
 def _align(table: list[list[str]]) -> str:
@@ -84,7 +84,7 @@ def _align(table: list[list[str]]) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Terminals and pipes of any encoding take it."""
+    """Return a text that terminals and pipes of any encoding take."""
     for sign, plain in (("−", "-"), (data.MISSING, "-")):
         text = text.replace(sign, plain)
     return text

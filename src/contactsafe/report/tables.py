@@ -1,60 +1,50 @@
-"""Figures as HTML: cards with bars, tables with spreads, sentences about what was missed."""
+"""Figures as HTML: cards, tables with spreads, sentences about what was missed."""
 
 import math
 from collections.abc import Sequence
 from html import escape
 
 from contactsafe.report import data, rows
-from contactsafe.report.data import BASELINE, MISSING, Experiment, Spread, Table
+from contactsafe.report.data import MISSING
 from contactsafe.report.rows import Line
-
-HEADLINES = (
-    ("joint-safety", "bottle", "contact_steady_n", "Steady force on the bottle the arm ran into"),
-    ("disturbance", "push on link 5 while holding", "error_max_mm", "Tool error under a push on the forearm"),
-    ("task-safety", "wiping", "ink_removed", "Ink wiped off boards never seen before"),
-)
-"""Experiment, scenario and metric of each big figure, and what it is."""
+from contactsafe.results.experiment import Experiment, Table
+from contactsafe.results.metrics import BASELINE, ratio
+from contactsafe.results.spread import Spread
 
 
 def coloured(controller: str) -> str:
-    """Give the style attribute that makes an element a controller's."""
+    """Return the style attribute that makes an element a controller's."""
     return f'style="--c: var({data.css_variable(controller)})"'
 
 
 def cards(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
-    """Write the big figures: the last controller's median, and all medians as bars."""
-    out = []
-    for experiment_name, scenario, metric, label in HEADLINES:
-        experiment = data.find(experiments, experiment_name)
-        if experiment is None:
-            continue
-        found = [line for line in rows.lines(experiment) if (line.scenario, line.row.metric) == (scenario, metric)]
-        out += [_card(line, label, names) for line in found]
-    return "\n".join(out)
+    """Return the highlights as cards: the last controller's middle, and those of all beside each other."""
+    return "\n".join(_card(line, label, names) for label, line in rows.highlights(experiments))
 
 
 def _card(line: Line, label: str, names: Sequence[str]) -> str:
-    medians = {name: line.row.scale * _median(line.values.get(name)) for name in names}
-    most = max((value for value in medians.values() if math.isfinite(value)), default=0.0)
-    bars = []
-    for name, value in medians.items():
+    unit, scale = line.metric.unit, line.metric.scale
+    middles = {name: scale * line.values[name].middle if name in line.values else math.nan for name in names}
+    most = max((value for value in middles.values() if math.isfinite(value)), default=0.0)
+    meters = []
+    for name, value in middles.items():
         width = 100 * value / most if math.isfinite(value) and most > 0 else 0.0
-        bars.append(
+        meters.append(
             f'<span class="name" {coloured(name)}>{escape(name)}</span>'
             f'<i style="--c: var({data.css_variable(name)}); width: {width:.1f}%"></i>'
-            f"<b>{data.number(value)} {line.row.unit}</b>"
+            f"<b>{data.number(value)} {unit}</b>"
         )
     subject = names[-1]
     return (
         f'<div class="card"><h3>{escape(label)}</h3>'
-        f'<p class="big" {coloured(subject)}>{data.number(medians[subject])} '
-        f"<small>{line.row.unit}, {escape(subject)}</small></p>"
-        f'<div class="bars">{"".join(bars)}</div></div>'
+        f'<p class="big" {coloured(subject)}>{data.number(middles[subject])} '
+        f"<small>{unit}, {escape(subject)}</small></p>"
+        f'<div class="meters">{"".join(meters)}</div></div>'
     )
 
 
 def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bool = False) -> str:
-    """Write a table of figures: median and [5th, 95th percentile] over seeds, ratios to the baseline, aims.
+    """Return a table of figures: median and [5th, 95th percentile] over seeds, ratios to the baseline, aims.
 
     Args:
         experiments: whose figures.
@@ -66,7 +56,7 @@ def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bo
     head += "".join(f"<th>{escape(name)} / {BASELINE}</th>" for name in others)
     body = []
     for experiment in experiments:
-        title = f"{rows.TITLES.get(experiment.name, experiment.name)}: " if main_only else ""
+        title = f"{experiment.title}: " if main_only else ""
         for heading, labelled in rows.groups(experiment, main_only):
             width = 3 + len(names) + len(others)
             body.append(f'<tr><th colspan="{width}" scope="rowgroup">{escape(title + heading)}</th></tr>')
@@ -74,30 +64,33 @@ def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bo
     return (
         '<div class="wide"><table><thead><tr><th>median [p5, p95] over seeds</th><th></th>'
         f'{head}<th class="aim">aim</th></tr></thead><tbody>{"".join(body)}</tbody></table></div>'
-        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the median, “always” on the largest of all runs.</p>'
+        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the median or mean shown, '
+        "“always” on the largest of all runs.</p>"
     )
 
 
 def _row(experiment: Experiment, label: str, line: Line, names: Sequence[str], others: Sequence[str]) -> str:
-    row = line.row
-    cells = [f"<td>{escape(label)}</td>", f'<td class="unit">{row.unit}</td>']
+    metric = line.metric
+    cells = [f"<td>{escape(label)}</td>", f'<td class="unit">{escape(metric.unit)}</td>']
     for name in names:
         value = line.values.get(name)
-        where = f"{experiment.name}/{line.scenario}/{name}/{row.metric}"
-        exact = f' data-median="{value.median:.6g}"' if value is not None and math.isfinite(value.median) else ""
+        where = f"{experiment.name}/{line.scenario}/{name}/{metric.name}"
+        exact = f' data-value="{value.middle:.6g}"' if value is not None and math.isfinite(value.middle) else ""
         of = f'data-of="{escape(name)}" {coloured(name)}'
-        cells.append(f'<td {of} data-figure="{escape(where)}"{exact}>{_spread(value, row.scale)}</td>')
+        cells.append(f'<td {of} data-figure="{escape(where)}"{exact}>{_spread(value, metric.scale)}</td>')
     for name in others:
-        ratio = data.number(data.ratio(line.values.get(name), line.baseline))
-        cells.append(f'<td data-of="{escape(name)} / {BASELINE}">{ratio}{_mark(line, name)}</td>')
-    aim = row.aim_in(line.scenario)
-    cells.append(f'<td class="aim" data-of="aim">{escape(aim.text(row.unit))}</td>' if aim else '<td class="aim"></td>')
+        multiple = data.number(ratio(line.values.get(name), line.baseline))
+        cells.append(f'<td data-of="{escape(name)} / {BASELINE}">{multiple}{_mark(line, name)}</td>')
+    aim = metric.aim
+    cells.append(
+        f'<td class="aim" data-of="aim">{escape(aim.text(metric.unit))}</td>' if aim else '<td class="aim"></td>'
+    )
     return f"<tr>{''.join(cells)}</tr>"
 
 
 def _mark(line: Line, name: str) -> str:
-    """A tick or a cross where the aim can be judged, and room for it where not: ratios stay aligned."""
-    reached = line.verdict(name)
+    """Return a tick or a cross where the aim can be judged, and room for it where not: ratios stay aligned."""
+    reached = line.reaches(name)
     if reached is None:
         return '<span class="mark"></span>'
     kind, title, sign = ("yes", "reached", "✓") if reached else ("no", "missed", "✗")
@@ -105,7 +98,7 @@ def _mark(line: Line, name: str) -> str:
 
 
 def plain(table: Table) -> str:
-    """Write one of an experiment's own tables."""
+    """Return one of an experiment's own tables."""
     left = [i == 0 or all(isinstance(row[i], str) for row in table.rows) for i in range(len(table.columns))]
 
     def cells(row: Sequence[str | float], tag: str) -> str:
@@ -125,7 +118,7 @@ def plain(table: Table) -> str:
 
 
 def tally(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
-    """Say in a sentence how many aims of all experiments each controller but the baseline reaches."""
+    """Return a sentence on how many aims of all experiments each controller but the baseline reaches."""
     said = []
     for name in names:
         reached, total = (sum(counts) for counts in zip(*(_count(e, name) for e in experiments), strict=True))
@@ -135,7 +128,7 @@ def tally(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
 
 
 def verdict(experiment: Experiment, names: Sequence[str]) -> str:
-    """Say for every controller but the baseline how many aims it reaches, and which it misses by how much."""
+    """Return for every controller but the baseline how many aims it reaches, and which it misses by how much."""
     out = []
     for name in names:
         reached, total = _count(experiment, name)
@@ -153,17 +146,13 @@ def verdict(experiment: Experiment, names: Sequence[str]) -> str:
 
 
 def _count(experiment: Experiment, name: str) -> tuple[int, int]:
-    """Aims reached, and aims that could be judged."""
-    judged = [line.verdict(name) for line in rows.lines(experiment)]
+    """Return the number of aims reached, and of aims that could be judged."""
+    judged = [line.reaches(name) for line in rows.lines(experiment)]
     return sum(reached is True for reached in judged), sum(reached is not None for reached in judged)
 
 
-def _median(value: Spread | None) -> float:
-    return math.nan if value is None else value.median
-
-
 def _spread(value: Spread | None, scale: float) -> str:
-    if value is None or not math.isfinite(value.median):
+    if value is None or not math.isfinite(value.middle):
         return MISSING
-    median, p5, p95 = (data.number(scale * x) for x in (value.median, value.p5, value.p95))
-    return f"{median} <span>[{p5}, {p95}]</span>"
+    middle, p5, p95 = (data.number(scale * x) for x in (value.middle, value.p5, value.p95))
+    return f"{middle} <span>[{p5}, {p95}]</span>"

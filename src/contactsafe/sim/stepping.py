@@ -50,9 +50,15 @@ def end_step(metrics):
 
 @compiled
 def begin_tick(world, controller, noise):
-    """Sense, control, and fill the torques that the backend is to write."""
+    """Sense, control, drive."""
     sense(world, controller, noise)
     control_tick(controller)
+    drive(world, controller, noise)
+
+
+@compiled
+def drive(world, controller, noise):
+    """Fill the torques that the backend is to write, and how much of the push is on."""
     actuate(world, controller, noise)
     world.push.fraction = push_fraction(world)
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from contactsafe.tasks.wiping.whiteboard import INK
 from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.tasks.wiping.whiteboard import INK
 
 
 def episode(config, script, n=4, seed=0, steps=None, drawing=None):

@@ -8,10 +8,11 @@ from numpy.testing import assert_allclose
 from tests.sim.scenes import BOARD_Z, CALM, DOWN, panda, posture
 
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
-from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
-from contactsafe.sim.config import Camera, WorldConfig
-from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
+from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.worlds import Worlds
+from contactsafe.tasks.wiping.board import Camera
+from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
+from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
 
 CAMERA = Camera()
 AWAY = (0.35, 0.0, 0.5)

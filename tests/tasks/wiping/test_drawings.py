@@ -10,7 +10,7 @@ from sklearn.datasets import load_digits
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping import handwriting
-from contactsafe.sim.config import BoardConfig
+from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.drawings import BOARDS, paint_board
 from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard
 

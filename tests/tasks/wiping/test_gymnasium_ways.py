@@ -5,6 +5,7 @@ import copy
 import gymnasium
 import numpy as np
 import pytest
+from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
@@ -14,7 +15,6 @@ from numpy.testing import assert_array_equal
 import contactsafe  # noqa: F401 -- registers the task
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 
 NAME = "contactsafe/Wiping-v0"
 SHORT = WipingConfig(episode_s=0.1)

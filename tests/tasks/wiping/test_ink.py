@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
+from contactsafe.tasks.wiping.bullet import BulletTasks
 from numpy.testing import assert_array_equal
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.sim.config import WorldConfig
+from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.camera import camera_at, render_mask
-from contactsafe.sim.config import BoardConfig, Camera, WorldConfig
+from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.ink import nearest_ink
 from contactsafe.tasks.wiping.randomisation import Randomisation
-from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
-from contactsafe.tasks.wiping.bullet import BulletTasks
-from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
 FULL = np.ones((2, 2))
 

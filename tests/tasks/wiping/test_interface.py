@@ -5,6 +5,7 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
+from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_array_equal
@@ -12,7 +13,6 @@ from numpy.testing import assert_array_equal
 import contactsafe  # noqa: F401 -- registers the task
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 
 NAME = "contactsafe/Wiping-v0"

@@ -10,10 +10,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.sim.scenes import CALM, panda, posture
 
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.drawings import BOARDS, paint_board
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer, sample_conditions
 from contactsafe.tasks.wiping.whiteboard import INK
-from contactsafe.sim.worlds import Worlds
 from contactsafe.vision.segment import Segmenter
 
 AWAY = (0.35, 0.0, 0.5)

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import contactsafe  # noqa: F401  (registers the task)
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.tasks.wiping.randomisation import Randomisation, draw
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.randomisation import Randomisation, draw
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 BROAD = WipingConfig(randomisation=Randomisation.broad(), episode_s=0.5)

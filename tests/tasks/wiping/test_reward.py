@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from contactsafe.tasks.wiping.env import WipingEnv
 from numpy.testing import assert_allclose
 from tests.tasks.wiping.tasks_by_script import circle_near_ink, episode, idle, press, wipe_nearest
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import RewardConfig, WipingConfig
-from contactsafe.tasks.wiping.env import WipingEnv
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 from contactsafe.tasks.wiping.tasks import WipingTasks
 

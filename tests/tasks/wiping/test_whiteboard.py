@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, aim, run, worlds_at
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.sim.config import BoardConfig
+from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.whiteboard import CLEAN, INK, OBJECT, Whiteboard, erase_under_pad
 
 CONFIG = BoardConfig()

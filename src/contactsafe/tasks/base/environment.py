@@ -96,7 +96,7 @@ class _Environment(Independent):
     @property
     def camera_homography(self) -> np.ndarray | None:
         """Plane coordinates (x, y, 1), m, to pixels (u, v, w) of the task's camera, (3, 3); None without one."""
-        return getattr(self.tasks, "camera_homography", None)
+        return self.tasks.camera_homography
 
     def _check_order(self, doing: str) -> None:
         if self._is_closed:

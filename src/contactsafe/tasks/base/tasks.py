@@ -232,6 +232,11 @@ class Tasks(Independent):
         """Whether time is up, (n,)."""
         return ~self.terminated & (self.tasks["steps"] >= self.step_limit)
 
+    @property
+    def camera_homography(self) -> np.ndarray | None:
+        """Plane coordinates (x, y, 1), m, to pixels (u, v, w) of the task's camera, (3, 3); None without one."""
+        return None
+
     def info(self) -> dict[str, np.ndarray]:
         """Return the reward's terms and the step's figures by name, arrays (n,)."""
         tasks = self.tasks

@@ -8,6 +8,7 @@ from contactsafe.tasks.wiping.config import ImageSource, WipingConfig
 from contactsafe.tasks.wiping.drawings import Boards
 from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.tasks.wiping.sampling import MaskSampler
+from contactsafe.tasks.wiping.scenes import Wiping
 from contactsafe.tasks.wiping.scripted import SCRIPTED
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
@@ -44,6 +45,7 @@ TASK = Task(
     training={"randomisation": Randomisation.broad()},
     scripted=SCRIPTED,
     mask_sampler=MaskSampler,
+    scenes=Wiping,
     variants=(
         ("cv2", ", photographs", WipingConfig(image_source="photograph"), "mujoco"),
         ("pybullet", " in PyBullet", WipingConfig(), "pybullet"),

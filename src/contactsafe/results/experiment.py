@@ -1,4 +1,4 @@
-"""What an experiment gives back: trials with figures, their spread over seeds, and recordings to be drawn."""
+"""Everything one experiment measured, with the declaration of what it is."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -6,15 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.results.figures import Figure
+from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.results.recording import Recording, Stage
+from contactsafe.results.spread import Spread, spread
+
 
 @dataclass(frozen=True)
 class Trial:
     """One run of one controller.
 
     Attributes:
-        scenario: what was done, such as 'bottle' or 'push on link 5 while wiping'.
+        scenario: what was done, such as 'bottle'.
         controller: preset by name.
-        seed: of board, start, obstacle and noise.
+        seed: of scene, start, obstacle and noise.
         metrics: figures by name; the name ends in the unit.
         plant: what it was done with where there is a choice, 'real' or 'clean'; else empty.
     """
@@ -29,45 +34,6 @@ class Trial:
     def heading(self) -> str:
         """Under what its figures are gathered: the scenario, and the plant where there is a choice."""
         return f"{self.scenario}, {self.plant} plant" if self.plant else self.scenario
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A figure over seeds.
-
-    Attributes:
-        median, mean, p5, p95, min, max: of the trials where the figure exists.
-        n: how many those are.
-    """
-
-    median: float
-    mean: float
-    p5: float
-    p95: float
-    min: float
-    max: float
-    n: int
-
-
-@dataclass(frozen=True)
-class Recording:
-    """One trial in time, for plots and films.
-
-    Attributes:
-        scenario, controller, seed: of the trial.
-        trace: `trace_dtype` records, one a millisecond, (T,).
-        boards: the board every `board_every` ticks, uint8 (F, rows, columns); 0 clean, 1 ink, 2 dark object.
-        board_every: ticks between boards.
-        obstacle: radius m and half length m (0 for a sphere) of the obstacle; None without one.
-    """
-
-    scenario: str
-    controller: str
-    seed: int
-    trace: np.ndarray
-    boards: np.ndarray
-    board_every: int
-    obstacle: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -89,7 +55,7 @@ class Table:
     note: str = ""
 
     def as_records(self) -> list[dict[str, Any]]:
-        """Give each row as a dictionary by column."""
+        """Return each row as a dictionary by column."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
 
@@ -99,20 +65,32 @@ class Experiment:
 
     Attributes:
         name: as on the command line, such as 'joint-safety'.
+        title: for readers.
         question: what it asks, in a sentence.
         trials: all of them.
-        recordings: of one seed, one for each scenario and controller that is to be drawn.
+        metrics: which of the trials' figures are shown, in order; the others are in `summary.json` and CSV alone.
+        highlights: which of them stand for the experiment.
+        recordings: of one seed, one for each scenario and controller that is to be shown.
+        figures: which of their curves are plotted.
+        stage: on which they are filmed; None for no film.
         tables: what else there is to say.
+        policy: what the learned policy does, in a sentence; empty where none acts.
     """
 
     name: str
+    title: str
     question: str
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial, ...] = ()
+    metrics: tuple[Metric, ...] = ()
+    highlights: tuple[Highlight, ...] = ()
     recordings: tuple[Recording, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    stage: Stage | None = None
     tables: tuple[Table, ...] = ()
+    policy: str = ""
 
     def spreads(self) -> dict[str, dict[str, dict[str, Spread]]]:
-        """Gather the trials: heading → controller → metric → spread over seeds."""
+        """Return the trials gathered: heading → controller → metric → spread over seeds."""
         values: dict[str, dict[str, dict[str, list[float]]]] = {}
         for trial in self.trials:
             row = values.setdefault(trial.heading, {}).setdefault(trial.controller, {})
@@ -126,32 +104,27 @@ class Experiment:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Give question, tables, spreads and trials as plain values for JSON; what does not exist is null."""
+        """Return declaration, tables, spreads and trials as plain values for JSON; what does not exist is null."""
         spreads = {
             scenario: {
-                controller: {name: _plain(asdict(value)) for name, value in row.items()}
+                controller: {name: _plain(value.as_dict()) for name, value in row.items()}
                 for controller, row in rows.items()
             }
             for scenario, rows in self.spreads().items()
         }
-        trials = [_plain(asdict(trial)) for trial in self.trials]
-        tables = {table.name: _plain(table.as_records()) for table in self.tables}
-        return {"question": self.question, "tables": tables, "spread": spreads, "trials": trials}
-
-
-def spread(values: list[float]) -> Spread:
-    """Summarise one figure over seeds; trials where it does not exist (NaN) are left out."""
-    numbers = np.array([value for value in values if np.isfinite(value)])
-    if numbers.size == 0:
-        nan = float("nan")
-        return Spread(nan, nan, nan, nan, nan, nan, 0)
-    p5, median, p95 = np.percentile(numbers, [5, 50, 95])
-    least, most = float(numbers.min()), float(numbers.max())
-    return Spread(float(median), float(numbers.mean()), float(p5), float(p95), least, most, int(numbers.size))
+        return {
+            "title": self.title,
+            "question": self.question,
+            "metrics": {metric.name: metric.as_dict() for metric in self.metrics},
+            "highlights": [asdict(highlight) for highlight in self.highlights],
+            "tables": {table.name: _plain(table.as_records()) for table in self.tables},
+            "spread": spreads,
+            "trials": [_plain(asdict(trial)) for trial in self.trials],
+        }
 
 
 def _plain(value: Any) -> Any:
-    """Make a value fit for strict JSON: NaN becomes null, floats keep six significant digits."""
+    """Return a value fit for strict JSON: NaN becomes null, floats keep six significant digits."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -162,5 +135,5 @@ def _plain(value: Any) -> Any:
 
 
 def to_json(value: Any) -> str:
-    """Write strict JSON, indented; a figure that does not exist (NaN) is null."""
+    """Return strict JSON, indented; a figure that does not exist (NaN) is null."""
     return json.dumps(_plain(value), indent=1, allow_nan=False)

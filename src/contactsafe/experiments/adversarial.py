@@ -1,25 +1,43 @@
-"""A hostile policy: random, extreme, jumping and unusable targets; does the arm keep every limit it promises?"""
+"""Adversarial targets: random, extreme, jumping and unusable targets; does the arm keep every limit it promises?"""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from contactsafe.control import presets
+from contactsafe.control.config import ControllerConfig
 from contactsafe.core.rotation import rotvec_to_quat
 from contactsafe.experiments.collision_scenes import sample_obstacle, sample_plant, scene_rng
-from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.results import Experiment, Trial
-from contactsafe.experiments.run import Progress
+from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.metrics import ZERO, Aim, Metric
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.config import REAL_SENSORS, Obstacle, WorldConfig
+from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
+NAME = "adversarial"
 QUESTION = (
-    "Targets are random, extreme, jump, and hold numbers that are none, among things in the arm's way: are torque, "
+    "Targets are random, extreme, jump, and hold numbers that are not finite, among obstacles: are torque, "
     "torque rate and joint range kept, and how much energy does the arm give away?"
 )
+METRICS = (
+    Metric("not_finite", "torques that are not finite", main=True, aim=ZERO),
+    Metric("torque_violations", "torques beyond the limit", main=True, aim=ZERO),
+    Metric("torque_rate_violations", "steps beyond the rate limit", main=True, aim=ZERO),
+    Metric("joint_range_violations", "ms outside the joint range", main=True, aim=ZERO),
+    Metric("joint_range_beyond_mrad", "largest excursion from the joint range", "mrad"),
+    Metric("energy_given_j", "energy given to the world", "J", main=True),
+    Metric(
+        "energy_most_of_bound", "energy given, fraction of the bound", "%", 100.0, main=True,
+        aim=Aim(at_most=100.0, always=True),
+    ),
+    Metric("contact_peak_n", "contact force, peak", "N", main=True),
+)  # fmt: skip
+
 TICKS = 10_000
 """Of one trial; 100 trials are a million."""
 
@@ -27,11 +45,10 @@ _RATE_TOLERANCE_NM = 1e-9
 _THINGS = 3
 
 
-def hostile(bundle, config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+def adversarial(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
     """Run the experiment; it needs no policy.
 
     Args:
-        bundle: not used.
         config: controllers and seeds; each trial is `TICKS` long.
         progress: told of every trial done.
     """
@@ -39,18 +56,23 @@ def hostile(bundle, config: ExperimentConfig, progress: Progress | None = None) 
     trials: list[Trial] = []
     for name in config.controllers:
         for seeds in config.batches():
-            metrics = run_hostile(arm, presets.by_name(name), seeds)
-            trials += [Trial("hostile policy", name, seed, row) for seed, row in zip(seeds, metrics, strict=True)]
+            metrics = run_adversarial(arm, presets.by_name(name), seeds)
+            trials += [Trial("adversarial targets", name, seed, row) for seed, row in zip(seeds, metrics, strict=True)]
             if progress:
                 progress(len(seeds))
-    return Experiment("hostile", QUESTION, tuple(trials))
+    return Experiment(NAME, "Adversarial targets", QUESTION, tuple(trials), METRICS)
 
 
-def run_hostile(arm: Arm, controller, seeds, ticks: int = TICKS) -> list[dict[str, float]]:
-    """Let a hostile policy loose on one arm for each seed.
+ENTRY = Entry(NAME, "targets that ask for the impossible: are all limits kept?", adversarial, trials=100)
+
+
+def run_adversarial(
+    arm: Arm, controller: ControllerConfig, seeds: Sequence[int], ticks: int = TICKS
+) -> list[dict[str, float]]:
+    """Drive one arm for each seed by adversarial targets.
 
     Returns:
-        For each, what it found; see `limit_metrics`.
+        For each, its metrics; see `limit_metrics`.
     """
     rngs = [scene_rng(seed, 2) for seed in seeds]
     worlds = Worlds(arm, [_world(arm, rng) for rng in rngs], controller, len(seeds), list(seeds))
@@ -75,14 +97,14 @@ def _world(arm: Arm, rng: np.random.Generator) -> WorldConfig:
 
 
 def _thing(rng: np.random.Generator) -> Obstacle:
-    """Draw something in the arm's reach, clear of where it stands at first."""
+    """Sample something in the arm's reach, clear of where it stands at first."""
     angle, distance = rng.uniform(0.5, 2 * np.pi - 0.5), rng.uniform(0.35, 0.6)
     position = (float(distance * np.cos(angle)), float(distance * np.sin(angle)), float(rng.uniform(0.2, 0.8)))
     return replace(sample_obstacle(rng, rng.uniform(0.03, 0.08), may_be_fixed=True), position=position)
 
 
-def corrupt_target(target, arm: Arm, rng: np.random.Generator) -> None:
-    """Write a target that no sane policy would ask for into a `target_dtype` record."""
+def corrupt_target(target: np.ndarray, arm: Arm, rng: np.random.Generator) -> None:
+    """Write an adversarial target into a `target_dtype` record."""
     scale = 10.0 ** rng.uniform(-2, 3)
     target["position"] = np.array([0.4, 0.0, 0.4]) + scale * rng.standard_normal(3)
     target["quat"] = rotvec_to_quat(rng.uniform(-np.pi, np.pi, 3))
@@ -94,8 +116,8 @@ def corrupt_target(target, arm: Arm, rng: np.random.Generator) -> None:
         target[field][rng.integers(target[field].shape[0])] = rng.choice([np.nan, np.inf, -np.inf, 1e300, -5.0, 0.0])
 
 
-def limit_metrics(trace: np.ndarray, arm: Arm, controller) -> dict[str, float]:
-    """Count what a run broke, and compare the energy that it gave away with what the tank allows.
+def limit_metrics(trace: np.ndarray, arm: Arm, controller: ControllerConfig) -> dict[str, float]:
+    """Count violations of limits, and compare the energy that it gave away with what the tank allows.
 
     Args:
         trace: `trace_dtype` records, one a ms, from rest, (T,).

@@ -5,10 +5,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.config import BATCH, ExperimentConfig
-from contactsafe.experiments.results import Experiment, Table, Trial, spread, to_json
+from contactsafe.results.experiment import Experiment, Table, Trial, to_json
+from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.results.spread import spread
 
 NAN = float("nan")
 
@@ -19,7 +21,7 @@ def experiment():
         for scenario, controller, values in (("bottle", "vices", (4.0, 1.0, 2.0)), ("bottle", "safe", (1.0, NAN, 3.0)))
         for seed, value in enumerate(values)
     ]
-    return Experiment("joint-safety", "How hard?", tuple(trials))
+    return Experiment("joint-safety", "Joint safety", "Which forces?", tuple(trials))
 
 
 def test_a_spread_is_the_quantiles_of_the_values():
@@ -49,14 +51,14 @@ def test_plants_are_gathered_apart():
     trials = tuple(
         Trial("hold", "safe", 0, {"force_n": force}, plant) for plant, force in (("real", 2.0), ("clean", 1.0))
     )
-    spreads = Experiment("collisions", "How hard?", trials).spreads()
+    spreads = Experiment("collisions", "Collisions", "Which forces?", trials).spreads()
     assert list(spreads) == ["hold, real plant", "hold, clean plant"]
     assert spreads["hold, clean plant"]["safe"]["force_n"].median == 1.0
 
 
 def test_tables_are_records_in_json():
     table = Table("worst", "The worst", ("seed", "peak (N)"), ((3, 4.5), (7, NAN)), "Look at them.")
-    written = Experiment("collisions", "How hard?", (), (), (table,)).as_dict()
+    written = Experiment("collisions", "Collisions", "Which forces?", tables=(table,)).as_dict()
     assert written["tables"] == {"worst": [{"seed": 3, "peak (N)": 4.5}, {"seed": 7, "peak (N)": None}]}
 
 
@@ -81,27 +83,48 @@ def test_evaluation_of_a_policy_that_cleaned_nothing_is_still_json():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("fields", "text"),
-    [
-        ({"controllers": ("safe", "best")}, "controller 'best' is unknown; choose from vices, paper, safe"),
-        ({"controllers": ()}, "no controller given; choose from vices, paper, safe"),
-        ({"controllers": ("safe", "safe")}, "controllers = safe,safe; give each once"),
-        ({"trials": 0}, "trials = 0; give 1 or more"),
-        ({"seed": -1}, "seed = -1; give 0 or more"),
-        ({"plants": ("real", "wet")}, "plants = real,wet; choose from real, clean"),
-        ({"plants": ()}, "plants = ; choose from real, clean"),
-        ({"minutes": 0.0}, "minutes = 0; give a number greater than 0"),
-    ],
+scenarios = st.sampled_from(["bottle", "thrust meter"])
+trials = st.lists(
+    st.builds(
+        Trial,
+        scenario=scenarios,
+        controller=st.sampled_from(["vices", "safe"]),
+        seed=st.integers(0, 9),
+        metrics=st.fixed_dictionaries({"force_n": st.floats(0, 100), "time_s": st.just(NAN)}),
+        plant=st.sampled_from(["", "real", "clean"]),
+    ),
+    max_size=30,
 )
-def test_experiments_that_cannot_be_run_are_refused(fields, text):
-    with pytest.raises(InvalidInputError) as caught:
-        ExperimentConfig(**fields)
-    assert str(caught.value) == text
 
 
-@pytest.mark.parametrize("trials", [1, BATCH, BATCH + 1, 40])
-def test_batches_hold_every_seed_once_in_order(trials):
-    batches = ExperimentConfig(trials=trials, seed=5).batches()
-    assert [seed for batch in batches for seed in batch] == list(range(5, 5 + trials))
-    assert max(len(batch) for batch in batches) <= BATCH
+@given(trials)
+def test_every_trial_is_in_one_spread(found):
+    spreads = Experiment("x", "X", "?", tuple(found)).spreads()
+    counted = sum(row["force_n"].n for rows in spreads.values() for row in rows.values())
+    assert counted == len(found)
+    assert set(spreads) == {trial.heading for trial in found}
+    assert all(row["time_s"].n == 0 for rows in spreads.values() for row in rows.values())
+
+
+@given(trials)
+def test_an_experiment_is_strict_json_whatever_it_measured(found):
+    read = json.loads(to_json(Experiment("x", "X", "?", tuple(found)).as_dict()), parse_constant=pytest.fail)
+    assert len(read["trials"]) == len(found)
+
+
+@pytest.mark.parametrize(("plant", "heading"), [("", "bottle"), ("real", "bottle, real plant")])
+def test_a_plant_is_part_of_the_heading(plant, heading):
+    assert Trial("bottle", "safe", 0, {}, plant).heading == heading
+
+
+def test_declarations_go_along():
+    metric = Metric("force_n", "force", "N", main=True)
+    written = Experiment("x", "The x", "Why?", (), (metric,), (Highlight("bottle", "force_n", "Force"),)).as_dict()
+    assert (written["title"], written["question"]) == ("The x", "Why?")
+    assert written["metrics"] == {"force_n": metric.as_dict()}
+    assert written["highlights"] == [{"scenario": "bottle", "metric": "force_n", "label": "Force"}]
+
+
+@given(st.floats(-1e6, 1e6))
+def test_numbers_keep_six_digits(value):
+    assert json.loads(to_json({"value": value}))["value"] == pytest.approx(value, rel=1e-5, abs=1e-300)

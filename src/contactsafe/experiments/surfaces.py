@@ -1,0 +1,49 @@
+"""Points on the surface of an arm, and how far others are from it."""
+
+import numpy as np
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.description import ArmDescription, Tool
+from contactsafe.robot.shape import arm_capsules
+
+
+def description_and_tool(arm: Arm) -> tuple[ArmDescription, Tool]:
+    """Return what an arm was built from.
+
+    Raises:
+        InvalidInputError: it was not built from a description.
+    """
+    if arm.description is None or arm.tool is None:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no description to know its surface by; give contactsafe.robots.panda()"
+        )
+    return arm.description, arm.tool
+
+
+def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Sample a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
+    description, tool = description_and_tool(arm)
+    capsules = tool.capsules if link > arm.n else description.links[link - 1].capsules
+    capsule = capsules[rng.integers(len(capsules))]
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    normal = rng.standard_normal(3)
+    normal /= np.linalg.norm(normal)
+    along = end - start
+    foot = start + rng.random() * along
+    if along @ normal > 0 and rng.random() < 0.3:
+        foot = end  # a round end
+    else:
+        axis = along / np.linalg.norm(along)
+        normal -= (normal @ axis) * axis
+        normal /= np.linalg.norm(normal)
+    return foot + capsule.radius * normal, normal
+
+
+def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
+    """Return the least distance of a point from the arm's capsules over postures q (T, n), m."""
+    starts, ends, radii, _ = arm_capsules(*description_and_tool(arm), q)
+    along = ends - starts
+    fraction = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
+    nearest = starts + np.clip(fraction, 0.0, 1.0)[..., None] * along
+    return float((np.linalg.norm(point - nearest, axis=2) - radii).min())

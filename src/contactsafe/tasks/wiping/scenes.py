@@ -1,0 +1,144 @@
+"""The wiping task as the experiments see it: boards to wipe, a lure beside an obstacle, strokes under pushes."""
+
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from contactsafe.policy.action import DOWN
+from contactsafe.policy.action_config import ACTION_SIZE, ActionConfig
+from contactsafe.results.figures import Panel
+from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.obstacles import Obstacle
+from contactsafe.sim.worlds import POLICY_RATE_HZ
+from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
+from contactsafe.tasks.wiping import pictures
+from contactsafe.tasks.wiping.camera import render_mask_into
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.tasks import WipingTasks
+
+LURE_CENTRE, LURE_SIZE = (0.5, -0.24), (0.10, 0.06)
+"""A dark object on the right of the board, unknown to the policy, which takes it for ink; m."""
+
+OBSTACLE_AT = (-0.12, -0.06)
+"""Range of the tool's y at which the forearm meets the obstacle, m."""
+
+_HOLD_HEIGHT = 0.06  # m above the board
+_PRESS = 0.004  # depth of x_d below the board while wiping, m
+_ABOVE = 0.001  # start of the strokes above the board, m
+_STROKE, _PERIOD_S = 0.08, 5.0  # half length, m, and period, s, of the strokes
+
+
+class WipingEpisodes(TaskEpisodes):
+    """Held-out boards, one a seed."""
+
+    tasks: WipingTasks
+
+    def curves(self) -> Mapping[str, np.ndarray]:
+        """Return the fraction of the ink that is left, (n,)."""
+        return {"ink_left": self.tasks.info()["ink_left"]}
+
+    def pictures(self) -> np.ndarray:
+        """Return the boards' cells, uint8 (n, rows, columns), copied."""
+        return self.tasks.boards.cells.copy()
+
+    def timed(self) -> Mapping[str, tuple[Callable[[], object], int]]:
+        """Return what is worth timing by itself: the mask."""
+        boards, plant = self.tasks.boards, self.worlds.records[0]["plant"]
+        size = boards.masks.shape[1]
+
+        def mask() -> None:
+            render_mask_into(boards.camera, boards.ink_index.shown[0], plant, boards.masks[0])
+
+        return {f"mask, {size} × {size}": (mask, 50)}
+
+
+class Wiping:
+    """The wiping task for `contactsafe.experiments.task.ExperimentTask`."""
+
+    name = pictures.NAME
+    policy = pictures.POLICY
+    metrics: tuple[Metric, ...] = pictures.METRICS
+    highlights: tuple[Highlight, ...] = pictures.HIGHLIGHTS
+    panels: tuple[Panel, ...] = pictures.PANELS
+    stage = pictures.STAGE
+
+    def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
+        """Return held-out boards."""
+        return WipingEpisodes(WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds)), seeds)
+
+    def towards_obstacle(
+        self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
+    ) -> WipingEpisodes:
+        """Return boards with a lure on the right, begun on the left, and an obstacle between."""
+        probe, rngs = WipingTasks(WipingConfig()), [held_out(seed) for seed in seeds]
+        obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
+        worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
+        tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds), worlds)
+        return WipingEpisodes(tasks, seeds, _lured, rngs)
+
+    def scripted(
+        self,
+        controller: str,
+        seeds: Sequence[int],
+        worlds: Sequence[WorldConfig],
+        stiffness: Sequence[float],
+        works: bool,
+    ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
+        """Return boards and a script: strokes, or nothing just above the board."""
+        action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
+        tasks = WipingTasks(WipingConfig(controller=controller, action=action), len(seeds), list(seeds), worlds)
+        x, y, z = tasks.config.board.centre
+        start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
+        episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))
+        return episodes, strokes(action) if works else _nothing
+
+    def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
+        """Return how much ink went, whether the board is clean, and how long that took."""
+        return {
+            "ink_removed": float(1.0 - curves["ink_left"][-1]),
+            "clean": float(succeeded),
+            "time_s": float(trace["time"][-1]) if succeeded else float("nan"),
+        }
+
+
+def meeting_posture(tasks: WipingTasks, rng: np.random.Generator) -> np.ndarray:
+    """Sample joint positions at which the forearm meets the obstacle on the tool's path to the lure, (n,), rad."""
+    x, _, z = tasks.config.board.centre
+    return tasks.posture_over(Pose(np.array([x, rng.uniform(*OBSTACLE_AT), z]), DOWN))
+
+
+def _lured(tasks: WipingTasks, i: int, rng: np.random.Generator) -> None:
+    x, y, z = tasks.config.board.centre
+    # On the left half of the board: never beyond the obstacle to begin with.
+    tasks.reset(i, rng, start=(x + rng.uniform(-0.1, 0.1), y + rng.uniform(0.0, 0.1), z + 0.05))
+    tasks.boards.boards[i].place_object(LURE_CENTRE, LURE_SIZE)
+    tasks.observe(i)
+
+
+def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
+    return np.zeros((len(observation["pose"]), ACTION_SIZE))
+
+
+def strokes(action: ActionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
+    """Return a script that presses the pad on the board and strokes sideways from where the tool stands.
+
+    Args:
+        action: what an action of 1 stands for.
+    """
+    step = 0
+
+    def act(observation: dict[str, np.ndarray]) -> np.ndarray:
+        nonlocal step
+        actions = np.zeros((len(observation["pose"]), ACTION_SIZE))
+        phase = 2 * math.pi / (POLICY_RATE_HZ * _PERIOD_S)
+        actions[:, 1] = _STROKE * (math.sin(phase * (step + 1)) - math.sin(phase * step)) / action.translation[1]
+        down = (_ABOVE + _PRESS) / 6  # over the first six steps
+        actions[:, 2] = -down / action.translation[2] if step < 6 else 0.0
+        step += 1
+        return actions
+
+    return act
