@@ -17,7 +17,6 @@ import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv
 
 import contactsafe as cs
 from contactsafe.control.records import controller_dtype
@@ -32,6 +31,7 @@ from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.worlds import Worlds
+from contactsafe.tasks.base.environment import TaskEnv
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.randomisation import Randomisation
@@ -54,7 +54,7 @@ def observation(n=2):
 
 
 def homography():
-    return WipingTasks().worlds.homography
+    return WipingTasks().boards.homography
 
 
 # What each does next, as arrays; called again it goes on from there.
@@ -453,7 +453,7 @@ def test_controllers_that_share_records_are_copied_with_them():
 
 
 def test_what_a_user_hung_on_a_subclass_goes_along():
-    class Mine(WipingEnv):
+    class Mine(TaskEnv):
         def __init__(self):
             super().__init__(VARIED)
             self.seen = []

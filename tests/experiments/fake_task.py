@@ -47,7 +47,7 @@ class ReachingEpisodes:
 
     @property
     def camera_homography(self):
-        return self.worlds.homography
+        return self.boards.homography
 
     def observation(self):
         n = self.worlds.n

@@ -46,11 +46,11 @@ def wipe_nearest(tasks, step, depth=0.004):
     """Press, and head for the nearest ink, over its far edge."""
     action = press(tasks, step, depth)
     for i in range(tasks.worlds.n):
-        ink = np.argwhere(tasks.worlds.cells[i] == INK)
+        ink = np.argwhere(tasks.boards.cells[i] == INK)
         if len(ink) == 0:
             continue
         record = tasks.worlds.controllers[i]
-        places = tasks.worlds.boards[i].origin + (ink + 0.5) * 0.002
+        places = tasks.boards.boards[i].origin + (ink + 0.5) * 0.002
         away = places - record["output"]["position"][:2]
         goal = places[np.argmin(np.linalg.norm(away, axis=1))]
         error = goal - record["output"]["position"][:2]

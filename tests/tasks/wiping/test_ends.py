@@ -61,7 +61,7 @@ def test_the_pad_on_the_board_is_not_the_arm_on_the_table(depth):
 def test_a_speck_below_the_share_counts_as_clean():
     tasks = WipingTasks(TASK)
     tasks.reset(0, np.random.default_rng(0), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.08))
-    cells = tasks.worlds.cells[0]
+    cells = tasks.boards.cells[0]
     rows, columns = np.nonzero(cells)
     keep = int(TASK.clean_fraction * len(rows))
     cells[rows[keep + 1 :], columns[keep + 1 :]] = 0

@@ -5,7 +5,6 @@ import copy
 import gymnasium
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
@@ -14,6 +13,7 @@ from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.environment import TaskEnv, TaskVectorEnv
 from contactsafe.tasks.wiping.config import WipingConfig
 
 NAME = "contactsafe/Wiping-v0"
@@ -25,12 +25,12 @@ IDLE = np.zeros(18, np.float32)
 
 @pytest.fixture
 def env():
-    return WipingEnv(SHORT)
+    return TaskEnv("wiping", SHORT)
 
 
 @pytest.fixture
 def envs():
-    made = WipingVectorEnv(3, SHORT)
+    made = TaskVectorEnv(3, "wiping", SHORT)
     yield made
     made.close()
 
@@ -57,7 +57,7 @@ def test_limits_of_an_episode_are_those_asked_for():
         envs = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, render_mode=None, max_episode_steps=5)
         assert steps_until_cut(envs) == 5
         envs.close()
-    assert steps_until_cut(WipingVectorEnv(2, SHORT, max_episode_steps=9)) == 9
+    assert steps_until_cut(TaskVectorEnv(2, "wiping", SHORT, max_episode_steps=9)) == 9
 
 
 def test_spec_says_how_many_steps_an_episode_has():
@@ -79,7 +79,7 @@ def test_a_step_before_the_first_reset_is_told_as_gymnasium_tells_it(env, envs):
 
 
 def test_closing_twice_does_no_harm_and_what_is_closed_says_so(env):
-    envs = WipingVectorEnv(2, SHORT)
+    envs = TaskVectorEnv(2, "wiping", SHORT)
     for made in (env, envs):
         made.reset(seed=0)
         made.close()
@@ -90,7 +90,7 @@ def test_closing_twice_does_no_harm_and_what_is_closed_says_so(env):
         assert "`reset` was called after `close`" in refusal(made.reset, error=ClosedEnvironmentError)
 
 
-@pytest.mark.parametrize("make", [WipingEnv, WipingVectorEnv])
+@pytest.mark.parametrize("make", [TaskEnv, TaskVectorEnv])
 def test_what_it_cannot_be_made_with_is_told(make):
     assert "unexpected keyword argument 'board'" in refusal(make, board=1, error=TypeError)
     assert refusal(make, config={"episode_s": 1.0}) == (
@@ -160,7 +160,7 @@ def test_a_reset_mask_begins_new_episodes_where_it_is_true_and_nowhere_else(envs
 def test_a_reset_mask_seeds_those_it_chooses(envs, seed):
     envs.reset(seed=0)
     after, _ = envs.reset(seed=seed, options={"reset_mask": np.array([False, True, False])})
-    alone, _ = WipingEnv(SHORT).reset(seed=5)
+    alone, _ = TaskEnv("wiping", SHORT).reset(seed=5)
     assert_array_equal(after["mask"][1], alone["mask"])
 
 
@@ -177,7 +177,7 @@ def test_a_reset_mask_that_means_nothing_is_told(envs, mask):
 def test_a_vector_environment_says_when_it_resets_and_renders(envs):
     assert envs.autoreset_mode is envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     assert envs.render() is None
-    drawn = WipingVectorEnv(2, SHORT, render_mode="rgb_array")
+    drawn = TaskVectorEnv(2, "wiping", SHORT, render_mode="rgb_array")
     seen, _ = drawn.reset(seed=0)
     pictures = drawn.render()
     assert len(pictures) == 2

@@ -42,7 +42,7 @@ def test_a_drawing_of_ones_own_wins():
 def test_the_sight_changes_no_board_and_no_start():
     plain, seen = (gymnasium.make(NAME, config=WipingConfig(image_source=sight)) for sight in ("mask", "photograph"))
     (a, _), (b, _) = plain.reset(seed=5), seen.reset(seed=5)
-    assert_array_equal(plain.unwrapped.tasks.worlds.cells, seen.unwrapped.tasks.worlds.cells)
+    assert_array_equal(plain.unwrapped.tasks.boards.cells, seen.unwrapped.tasks.boards.cells)
     assert_array_equal(a["pose"], b["pose"])
     assert agreement(a["mask"], b["mask"]) > 0.6
     assert plain.unwrapped.tasks.tasks["light"][0] == 0
@@ -64,10 +64,10 @@ def test_where_the_arm_hides_the_board_is_known_by_its_encoders():
     """Encoders that are off move the silhouette that is masked out, while the photograph stays what it was."""
     tasks = WipingTasks(PHOTOGRAPHED)
     tasks.reset(0, np.random.default_rng(1), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.05))
-    before, picture = tasks.worlds.masks[0].copy(), tasks._images.photograph(0, tasks.tasks[0])
+    before, picture = tasks.boards.masks[0].copy(), tasks._images.photograph(0, tasks.tasks[0])
     tasks.worlds.plants[0]["q_seen"][0] += 0.2
     tasks.observe(0)
-    assert not np.array_equal(tasks.worlds.masks[0], before)
+    assert not np.array_equal(tasks.boards.masks[0], before)
     assert_array_equal(tasks._images.photograph(0, tasks.tasks[0]), picture)
 
 
@@ -88,10 +88,10 @@ def test_light_and_noise_follow_from_the_tasks_record_alone():
     tasks, others = WipingTasks(PHOTOGRAPHED), WipingTasks(PHOTOGRAPHED)
     for one, seed in ((tasks, 1), (others, 2)):
         one.reset(0, np.random.default_rng(seed), drawing=np.eye(5), start=(0.5, 0.1, 0.05))
-    assert not np.array_equal(tasks.worlds.masks, others.worlds.masks)
+    assert not np.array_equal(tasks.boards.masks, others.boards.masks)
     others.tasks["light"] = tasks.tasks["light"]
     others.observe(0)
-    assert_array_equal(tasks.worlds.masks, others.worlds.masks)
+    assert_array_equal(tasks.boards.masks, others.boards.masks)
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.bullet import BulletTasks
 from numpy.testing import assert_array_equal
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.sim.bullet_backend import BulletBackend
 from contactsafe.sim.config import WorldConfig
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.camera import camera_at, render_mask
@@ -67,13 +67,13 @@ def test_the_mask_is_that_of_the_whole_board():
 
 def test_the_same_in_the_second_engine():
     pytest.importorskip("pybullet")
-    tasks = begun(BulletTasks(WipingConfig(), 1, seed=0))
+    tasks = begun(WipingTasks(WipingConfig(), 1, seed=0, backend=BulletBackend))
     before = tasks.worlds.ink_cells()
     wiping(tasks, 60)
-    tasks.worlds.boards[0].place_object((0.4, 0.1), (0.03, 0.03))
+    tasks.boards.boards[0].place_object((0.4, 0.1), (0.03, 0.03))
     wiping(tasks, 1)
     assert (tasks.worlds.ink_cells() < before).all()
-    assert_array_equal(tasks.worlds.masks, whole_masks(tasks.worlds))
+    assert_array_equal(tasks.boards.masks, whole_masks(tasks.worlds))
 
 
 def test_ink_is_counted_and_the_nearest_found_and_an_object_is_no_ink():

@@ -5,13 +5,13 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv, WipingVectorEnv
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.environment import TaskEnv, TaskVectorEnv
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 
@@ -63,7 +63,7 @@ def test_spaces(env, envs):
 
 
 def test_make_vec_steps_natively(envs):
-    assert isinstance(envs.unwrapped, WipingVectorEnv)
+    assert isinstance(envs.unwrapped, TaskVectorEnv)
     assert envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
@@ -156,12 +156,12 @@ def test_observation_is_a_copy(env):
 
 
 def test_rendering_is_the_mask_enlarged():
-    env = WipingEnv(SHORT, render_mode="rgb_array")
+    env = TaskEnv("wiping", SHORT, render_mode="rgb_array")
     observation, _ = env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (512, 512, 3)
     assert_array_equal(picture[::4, ::4, 0], observation["mask"][..., 0])
-    assert WipingEnv(SHORT).render() is None
+    assert TaskEnv("wiping", SHORT).render() is None
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_bad_actions_are_refused_and_change_nothing(env, action, text):
 @pytest.mark.parametrize("count", [0, -1, 1.5, "3", None])
 def test_no_number_of_environments_is_refused(count):
     with pytest.raises(InvalidInputError) as caught:
-        WipingVectorEnv(count)
+        TaskVectorEnv(count)
     assert str(caught.value) == f"num_envs = {count!r}; give a whole number from 1 on"
 
 

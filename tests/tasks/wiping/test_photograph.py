@@ -24,7 +24,7 @@ class Studio:
 
     def __init__(self):
         self.worlds = Worlds(panda(), CALM)
-        self.board = self.worlds.boards[0]
+        self.board = self.boards.boards[0]
         self.photographer = Photographer(CALM.camera, CALM.board, self.worlds.models[0])
         self.segmenter = Segmenter(self.photographer.homography, self.photographer.corners)
 
@@ -95,7 +95,7 @@ def test_the_last_specks_are_found(studio, severity):
             studio.board.cells[i : i + 2, j : j + 2] = INK
         ink = studio.masks(seed, severity)[0]
         for corner in corners:
-            u, v, w = studio.worlds.homography @ [*(studio.board.origin + (corner + 1) * CALM.board.cell), 1.0]
+            u, v, w = studio.boards.homography @ [*(studio.board.origin + (corner + 1) * CALM.board.cell), 1.0]
             u, v = int(u / w), int(v / w)
             found, specks = found + ink[v - 1 : v + 2, u - 1 : u + 2].any(), specks + 1
     assert found / specks >= 0.95
@@ -126,7 +126,7 @@ def test_what_kinematics_hide_is_what_the_mask_hides(studio):
 
 def test_the_homography_is_the_masks_scaled(studio):
     scale = np.diag([PHOTO_PX / 128, PHOTO_PX / 128, 1.0])
-    mine, masks = studio.photographer.homography, scale @ studio.worlds.homography
+    mine, masks = studio.photographer.homography, scale @ studio.boards.homography
     assert_allclose(mine / mine[2, 2], masks / masks[2, 2], atol=1e-9)
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv
 from numpy.testing import assert_allclose
 from tests.tasks.wiping.tasks_by_script import circle_near_ink, episode, idle, press, wipe_nearest
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.environment import TaskEnv
 from contactsafe.tasks.wiping.config import RewardConfig, WipingConfig
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 from contactsafe.tasks.wiping.tasks import WipingTasks
@@ -24,7 +24,7 @@ def finished():
 
 
 def test_terms_sum_to_the_reward_and_each_is_in_info():
-    env = WipingEnv(TASK)
+    env = TaskEnv("wiping", TASK)
     env.reset(seed=0)
     for action in np.random.default_rng(0).uniform(-1, 1, (40, 18)):
         _, reward, _, _, info = env.step(action)
