@@ -5,6 +5,7 @@ from typing import Any
 
 from contactsafe.tasks.base.task import Task, TaskOptions
 from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scenes import Insertion
 from contactsafe.tasks.insertion.scripted import SCRIPTED
 from contactsafe.tasks.insertion.tasks import InsertionTasks
 
@@ -28,4 +29,4 @@ class InsertionOptions(TaskOptions):
         return {**super().settings(), "clearance_m": self.clearance_mm / 1e3, "error_m": self.error_mm / 1e3}
 
 
-TASK = Task(InsertionTasks, InsertionOptions, scripted=SCRIPTED)
+TASK = Task(InsertionTasks, InsertionOptions, scripted=SCRIPTED, scenes=Insertion)
