@@ -261,7 +261,7 @@ def test_a_lighter_tool_weighs_less_and_shows_so_at_the_wrist():
         ({"inertia_scale": (1.0, 1.1)}, "inertia_scale has 2 numbers; give one, or one for each of 7 joints"),
         (
             {"payload_kg": -0.83},
-            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'wiper'; give a larger one",
+            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiper'; give a larger one",
         ),
     ],
 )
