@@ -144,7 +144,7 @@ def test_once_sensed_the_plant_may_change_unseen():
 
 
 def readings(worlds, ticks):
-    """Run tick by tick; give measured positions, measured velocities and the plant's before each tick."""
+    """Run tick by tick; return measured positions, measured velocities and the plant's before each tick."""
     q, qd, true_q, true_qd = [], [], [], []
     for _ in range(ticks):
         true_q.append(worlds.datas[0].qpos[:7].copy())

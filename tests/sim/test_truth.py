@@ -150,7 +150,7 @@ def test_obstacles_that_cannot_be_are_refused(fields, text):
 
 
 def pole(place):
-    """Give a thing that cannot move."""
+    """Return a thing that cannot move."""
     return Obstacle(place, radius=0.035, stiffness=math.inf, half_length=0.09)
 
 

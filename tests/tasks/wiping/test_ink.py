@@ -25,7 +25,7 @@ def begun(tasks):
 
 
 def other_cameras(n=3):
-    """Give tasks each under another camera, pictures as they are."""
+    """Make tasks each under another camera, pictures as they are."""
     ranges = Randomisation(camera_m=(-0.02, 0.02), camera_rad=(-0.03, 0.03))
     return begun(WipingTasks(WipingConfig(randomisation=ranges), n, seed=0))
 

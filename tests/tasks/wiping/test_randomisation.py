@@ -22,7 +22,7 @@ def varied(n=1, **ranges):
 
 
 def pressed(tasks, steps=60):
-    """Lower the pad for a second and give where it came to rest, m, and the force, N."""
+    """Lower the pad for a second and return where it came to rest, m, and the force, N."""
     down = np.zeros((tasks.worlds.n, 18))
     down[:, 2] = -1.0
     for _ in range(steps):
