@@ -105,7 +105,7 @@ def run_tasks(tasks):
 
 def run_episodes(episodes):
     episodes.step(np.full((episodes.worlds.n, 18), 0.3))
-    return [episodes.observation()["pose"], *episodes.curves().values(), episodes.pictures()]
+    return [*episodes.observation().values(), *episodes.curves().values(), episodes.pictures()]
 
 
 def step_env(env):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tests.sim.scenes import BOARD_Z, DOWN, posture
-from tests.tasks.wiping.boards_in_worlds import BOARD, scene as make_scene
+from tests.tasks.wiping.boards_in_worlds import BOARD
+from tests.tasks.wiping.boards_in_worlds import scene as make_scene
 
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.sim.config import WorldConfig

@@ -101,9 +101,7 @@ def test_ink_is_counted_and_the_nearest_found_and_an_object_is_no_ink():
 )
 def test_boards_and_masks_of_any_size_are_gone_through_to_their_last(board, camera):
     """Late by one picture, so that pictures are copied as well."""
-    config = WipingConfig(
-        board=board, camera=camera, randomisation=Randomisation(delay_steps=(1, 1))
-    )
+    config = WipingConfig(board=board, camera=camera, randomisation=Randomisation(delay_steps=(1, 1)))
     tasks = begun(WipingTasks(config, 3, seed=0))
     boards = tasks.boards
     boards.cells[:, -1, -1] = boards.cells[:, 0, 0] = INK
