@@ -65,7 +65,7 @@ def test_a_bundle_runs_unchanged():
 
 
 def test_single_environment():
-    env = gymnasium.make("contactsafe/WipingBullet-v0", config=SHORT)
+    env = gymnasium.make("contactsafe/Wiping-v0", config=SHORT, engine="pybullet")
     observation, _ = env.reset(seed=0)
     after, reward, terminated, truncated, info = env.step(np.zeros(18, np.float32))
     assert after in env.observation_space

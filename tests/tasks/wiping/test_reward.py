@@ -48,9 +48,9 @@ def test_a_step_in_the_air_costs_time_and_pays_approach_only():
     assert nearer > 0.001
 
 
-def test_the_ink_is_paid_once_in_shares_and_done_once(finished):
+def test_the_ink_is_paid_once_in_proportion_and_done_once(finished):
     _, tasks, terms = finished
-    assert tasks.tasks["clean"].all()
+    assert tasks.tasks["success"].all()
     assert_allclose(terms[:, :, 0].sum(axis=0), REWARD.ink, rtol=2 * TASK.clean_fraction)
     for i in range(4):
         first = int(np.argmax(terms[:, i, 1] > 0))
@@ -87,7 +87,7 @@ def test_stopping_short_pays_less_than_finishing_whatever_is_left():
 @pytest.mark.parametrize("script", [idle, press, circle_near_ink])
 def test_finishing_pays_best(finished, script):
     returns, tasks, _ = episode(TASK, script, n=4, steps=300)
-    assert not tasks.tasks["clean"].any()
+    assert not tasks.tasks["success"].any()
     # No policy step without ink wiped pays: the rest of the episode would only cost more.
     assert returns.max() < 5.0
     assert finished[0].min() > 2.0 * 5.0

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from contactsafe.tasks.base.task import Task
 
 TASKS: dict[str, str] = {}
-"""Place of every task, `module:NAME`, by its name."""
+"""Where every task is, by its name; see `register_task`."""
 
 ENGINES = ("mujoco", "pybullet")
 """What may compute the physics of a task."""
