@@ -10,8 +10,8 @@ from contactsafe.tasks.base.config import TaskConfig
 ACTION = ActionConfig(
     translation=(0.0005, 0.0005, 0.0004),
     rotation=(0.0025, 0.0025, 0.0025),
-    offset_max=0.02,
-    offset_max_z=0.015,
+    offset_max=0.012,
+    offset_max_z=0.012,
     press=0.06,
     height=0.03,
     reach=0.02,

@@ -15,7 +15,7 @@ from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.panda import PANDA
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
-from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
+from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG, PEG_RADIUS
 from contactsafe.tasks.insertion.tasks import InsertionTasks
@@ -94,7 +94,7 @@ class Insertion:
         works: bool,
     ) -> tuple[InsertionEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
-        action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))
+        action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
         config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
         tasks = InsertionTasks(config, len(seeds), list(seeds), worlds)
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
