@@ -10,8 +10,10 @@ from contactsafe.tasks.base.config import TaskConfig
 ACTION = ActionConfig(
     translation=(0.0005, 0.0005, 0.0004),
     rotation=(0.0025, 0.0025, 0.0025),
-    offset_max=0.012,
-    offset_max_z=0.012,
+    offset_max=0.01,
+    offset_max_z=0.01,
+    damping_low=(24.0, 24.0, 24.0, 40.0, 40.0, 40.0),
+    damping_high=(45.0, 45.0, 45.0, 60.0, 60.0, 60.0),
     press=0.06,
     height=0.03,
     reach=0.02,
