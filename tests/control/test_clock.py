@@ -1,7 +1,7 @@
 """Ticks late, measurements lost, frozen, repeated or impossible: bridged within bounds, then braked, and it is said."""
 
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
 
 from contactsafe import Measurement, presets
+from contactsafe.control.codes import FAULTS
 from contactsafe.control.controller import Controller
-from contactsafe.control.records import FAULTS
 from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
 
-CONFIG = replace(presets.safe(), friction_compensation=False)
+CONFIG = presets.safe().with_(friction_compensation=False)
 NAN = np.full(7, np.nan)
 AT = 150
 """Tick at which something happens to the clock; the tool then moves at 0.2 m/s."""
@@ -401,7 +401,7 @@ def test_one_time_far_ahead_blinded_the_arm_until_reset(panda, ahead):
     assert found.fault == FAULTS[8]
     assert found.step() <= 1.0
     assert max(out.bridged for out in found.outputs) == 0
-    assert found.controller.record["state"]["time"] == pytest.approx(1.499)
+    assert found.controller.record["state"]["clock"]["time"] == pytest.approx(1.499)
     assert np.linalg.norm(found.positions[-1] - found.positions[600]) < 0.001
 
 
@@ -450,7 +450,7 @@ def test_policy_that_repeats_its_target_is_not_silent(panda):
 
 def test_policy_may_be_silent_for_ever_where_that_is_allowed(panda):
     plant = Plant(panda)
-    controller = controller_at(panda, replace(CONFIG, target_timeout_s=np.inf))
+    controller = controller_at(panda, CONFIG.with_(target_timeout_s=np.inf))
     target = reach(panda, [0.0, 0.05, 0.0])
     plant.run(controller, target, 1)
     assert not plant.run(controller, None, 2000).target_late
@@ -467,7 +467,7 @@ def test_one_late_tick_filters_as_many_ticks_in_time_do(panda):
             controller.record["state"][name] = 1.0
         for k in times[1:]:
             controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED, 0.001 * k), hold(panda))
-        residuals.append(controller.record["state"]["observed_fast"].copy())
+        residuals.append(controller.record["state"]["observer"]["residual_fast_unfiltered"].copy())
     assert_allclose(residuals[0], residuals[1], rtol=0, atol=0.02)
 
 

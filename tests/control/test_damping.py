@@ -129,7 +129,7 @@ def test_the_dampers_of_a_panda_are_as_configured(panda):
     """Its joints are heavy enough for all of `safe()`, wherever it stands."""
     config, rng, limits = safe(), np.random.default_rng(2), np.empty(7)
     rate = damping_rate(config, GAIN_MARGIN) - 2.0 * math.sqrt(450.0)
-    wanted = np.maximum(config.D_posture, config.null_damping) + config.contact_damping
+    wanted = np.maximum(config.impedance.D_posture, config.reaction.null_damping) + config.reaction.contact_damping
     for _ in range(300):
         joint_damping_limits(panda.dynamics(rng.uniform(panda.q_min, panda.q_max), np.zeros(7))["M_inv"], rate, limits)
         assert (wanted <= 1.05 * limits).all()

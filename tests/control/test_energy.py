@@ -1,7 +1,5 @@
 """Gains change no faster than keeps the impedance passive, and the command gives no more energy than it may."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +12,7 @@ from tests.control.targets import hostile_target
 from contactsafe import Measurement, Pose, Target, presets
 from contactsafe.control.limits import passive_step, power_limit
 
-SAFE = replace(presets.safe(), friction_compensation=False)
+SAFE = presets.safe().with_(friction_compensation=False)
 ALPHA, DT = 2.0, 0.001
 stiffnesses = arrays(float, 6, elements=st.floats(10.0, 1500.0))
 dampings = arrays(float, 6, elements=st.floats(ALPHA, 120.0))
@@ -84,10 +82,10 @@ def energy_over_tank(arm, every, seed, ticks=4000):
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
         plant.step(out.torque)
-        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.limits.tank_power_w)
         lowest = min(lowest, level)
         worst = max(worst, level - lowest)
-    return worst - SAFE.tank_j
+    return worst - SAFE.limits.tank_j
 
 
 @pytest.mark.parametrize("every", [17, 50, 170])
@@ -115,7 +113,7 @@ def swept(arm, K, ticks=4000):
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
         plant.step(out.torque)
-        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.limits.tank_power_w)
         lowest, speed = min(lowest, level), max(speed, np.abs(plant.qd / arm.qd_max).max())
         worst = max(worst, level - lowest)
     return worst, speed
@@ -133,4 +131,4 @@ def test_tank_that_is_full_changes_nothing(panda):
     """At rest nothing is given, so the tank stays full."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 500, UNTOUCHED)
-    assert controller.record["state"]["tank_j"] == SAFE.tank_j
+    assert controller.record["state"]["limits"]["tank_j"] == SAFE.limits.tank_j

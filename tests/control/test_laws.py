@@ -15,7 +15,6 @@ from contactsafe.control.laws import (
     task_error,
     task_inertia,
     task_nullspace,
-    tool_share,
 )
 from contactsafe.core.linalg import shorten
 from contactsafe.core.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
@@ -132,31 +131,6 @@ def test_impedance_gives_each_axis_its_own_acceleration():
     pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
     assert_allclose(pull, 0.2 * K, rtol=0, atol=1e-14)
     assert_allclose(pull + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
-
-
-@given(seeds, st.floats(0.0, 60.0), st.floats(0.0, 40.0))
-def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed, touch, bound):
-    """Along the force felt, from twice the least contact on; a pull within the bound is left as it is."""
-    rng = np.random.default_rng(seed)
-    F, n = rng.normal(size=6) * 30.0, rng.normal(size=3)
-    n /= np.linalg.norm(n)
-    share = tool_share(F, touch * n, 3.0, bound)
-    push = -n @ F[:3]
-    assert 0.0 <= share <= 1.0
-    if touch < 3.0 or push <= bound:
-        assert share == 1.0
-    elif touch >= 6.0:
-        assert_allclose(share * push, bound, rtol=1e-9, atol=1e-9)
-    else:
-        assert share * push >= bound - 1e-9
-
-
-@given(st.floats(2.9, 6.1), st.floats(-1e-6, 1e-6))
-def test_bound_on_the_tool_sets_in_without_a_step(touch, more):
-    """A touch that comes and goes about the least one would otherwise jerk the arm."""
-    F, n = np.array([0.0, 0.0, -60.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    a, b = (tool_share(F, size * n, 3.0, 20.0) for size in (touch, touch + more))
-    assert abs(a - b) < 1e-5
 
 
 @given(seeds, st.floats(0.0, 0.08), st.floats(0.0, 200.0))

@@ -1,7 +1,5 @@
 """The collision battery: a trial is its seed's alone, and the page can be told what is asked of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -66,7 +64,7 @@ def test_what_replays_a_trial_is_a_command_for_presets_and_python_for_others(bat
     assert worst["replay"] == (
         f"contactsafe experiment collisions --controllers vices,safe --trials 1 --out trial-{seed} --seed {seed}"
     )
-    own = {"vices": presets.vices(), "softer": replace(presets.safe(), contact_force_limit_comply_n=8.0)}
+    own = {"vices": presets.vices(), "softer": presets.safe().with_(contact_force_limit_comply_n=8.0)}
     (row,) = run_battery(own, [3], ["clean"]).tables[1].as_records()
     assert row["replay"] == "run_battery(controllers, [3])"
 

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.robot.worlds import OWN_SCENE
 
+from contactsafe.control.contact_geometry import best_point, contact_lever, surface_torque
 from contactsafe.robot import robots
-from contactsafe.robot.contact import best_point, contact_lever, surface_torque
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
 

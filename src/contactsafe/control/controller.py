@@ -4,18 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactsafe.control.codes import FAULTS, FREE, KINDS, LIMITS
 from contactsafe.control.config import ControllerConfig
-from contactsafe.control.load import payload_weight_into, take_up
+from contactsafe.control.params import OUTSIDE_RAD, fill_params, mass_variance
+from contactsafe.control.payload import payload_weight_into
+from contactsafe.control.payload_change import take_up
 from contactsafe.control.presets import safe
-from contactsafe.control.records import (
-    CONTACT,
-    FAULTS,
-    LIMITS,
-    OUTSIDE_RAD,
-    controller_dtype,
-    fill_params,
-    mass_variance,
-)
+from contactsafe.control.records import controller_dtype
 from contactsafe.control.tick import tick_at
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
@@ -65,7 +60,7 @@ class Target(NamedTuple):
         pose: desired tool pose, world.
         stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
         damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
-        posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever way led there
+        posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever path led there
             (`InverseKinematics.posture_near`).
     """
 
@@ -82,13 +77,14 @@ class Contact(NamedTuple):
         in_contact: whether the contact-aware law is in force.
         link: found in contact on the arm's surface, or without one the furthest whose joint residual exceeds the
             threshold, 1 … n; 0 for none.
-        holding: whether the contact was found to push the arm rather than to stand in its way.
+        kind: 'obstacle', to which the arm gives way, or 'push', which it resists: one on the arm counts as an obstacle
+            until giving way has shown that it pushes; 'tool' where the tool alone touches something; 'none'.
         torque: estimated joint torque of the contact, (n,), N m (the triggering residual).
     """
 
     in_contact: bool
     link: int
-    holding: bool
+    kind: str
     torque: np.ndarray
 
 
@@ -100,7 +96,7 @@ class Output(NamedTuple):
         contact: on the arm.
         residual: estimated external joint torque the law compensates, (n,), N m.
         error: x_d − x, position and rotation vector, (6,), m and rad; of the arm as predicted while `bridged` is not 0.
-        limited_by: what took something off the task or the command: some of 'contact' (the bound on the push along
+        limited_by: what took something off the task or the command: some of 'contact' (the bound on the force along
             it), 'tool force' (`tool_force_limit_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range'
             (joint range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
         fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
@@ -191,13 +187,14 @@ class Controller(Independent):
         for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
         self.record["dynamics"] = dynamics
-        self.record["state"]["tau"], self.record["state"]["q_good"] = tau, q
+        state = self.record["state"]
+        state["command"]["tau"], state["clock"]["q_good"] = tau, q
         self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
         pose = self.arm.tool_pose(q)
-        held = self.record["state"]["target"]
+        held = state["target"]
         held["position"], held["quat"], held["q_posture"] = pose.position, pose.quat, q
-        held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.stiffness_range)
-        held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.damping_range)
+        held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.impedance.stiffness_range)
+        held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.impedance.damping_range)
         self.record["target"] = held
         self._last_numbers = []
         self._is_reset = True
@@ -237,13 +234,13 @@ class Controller(Independent):
         known["mass"], known["com"], known["inertia"] = load
         known["in_wrench"] = self._shows(load, gravity) if in_wrench is None else bool(in_wrench)
         self.record["handle"] = self._nominal.handle
-        self.record["params"]["mass_variance"] = mass_variance(self.config, loaded)
+        self.record["params"]["identification"]["mass_variance"] = mass_variance(self.config, loaded)
         if self.record["state"]["started"]:
             take_up(self._ticked, self._index, weight)
 
     def _refuse_overload(self, load: Payload, loaded: Arm) -> None:
         """Refuse what the motors do not hold where the arm is, unless it is less than they are said to hold already."""
-        q, still = self.record["state"]["q_good"] if self._is_reset else self.arm.home, np.zeros(self.arm.n)
+        q, still = self.record["state"]["clock"]["q_good"] if self._is_reset else self.arm.home, np.zeros(self.arm.n)
         need, before = (np.abs(arm.dynamics(q, still)["g"]) / self.arm.tau_max for arm in (loaded, self._loaded))
         over = (need > 1.0) & (need > before)
         if over.any():
@@ -260,25 +257,25 @@ class Controller(Independent):
         return bool(measured["has_wrench"] and load.mass > 0.0 and shown > 0.5 * load.mass * float(gravity @ gravity))
 
     def payload_estimate(self) -> Payload | None:
-        """Give what the tool seems to carry, all of it, as weighed while the arm hardly moved; `set_payload` takes it.
+        """Return all that the tool seems to carry, as identified while the arm hardly moved; `set_payload` takes it.
 
         The torques of one posture say nothing of how far above or below the tool point the load is: there its centre
         stays at the point, until another posture tells. What presses down on the tool is not told from a load.
 
         Returns:
-            Without inertia, which weighing does not tell; None where nothing weighs otherwise than what is known, or
+            Without inertia, which weight does not tell; None where nothing is heavier or lighter than what is known, or
             the arm moves.
         """
-        state, known = self.record["state"], self.payload
-        if not state["loaded"] or np.abs(state["qd"]).max() > _STILL_RAD_S:
+        state, known, found = self.record["state"], self.payload, self.record["state"]["payload"]
+        if not found["is_load"] or np.abs(state["arm"]["qd"]).max() > _STILL_RAD_S:
             return None
-        mass = max(known.mass + float(state["load"][0]), 0.0)
+        mass = max(known.mass + float(found["load"][0]), 0.0)
         if mass < _LEAST_KG:
             return checked_payload(0.0)
-        return Payload(mass, (known.mass * known.com + state["load"][1:]) / mass, np.zeros((3, 3)))
+        return Payload(mass, (known.mass * known.com + found["load"][1:]) / mass, np.zeros((3, 3)))
 
     def _believable(self, qd: np.ndarray) -> np.ndarray:
-        most = self.record["params"]["qd_most"]
+        most = self.record["params"]["arm"]["qd_most"]
         if (np.abs(qd) <= most).all():
             return qd
         i = int(np.argmax(np.abs(qd) > most))
@@ -305,11 +302,11 @@ class Controller(Independent):
         return np.maximum(self.arm.q_min - q, q - self.arm.q_max)
 
     def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
-        """Give the torque that the arm is under, as far as this controller can know, (n,), N m."""
+        """Return the torque that the arm is under, as far as this controller can know, (n,), N m."""
         state = self.record["state"]
-        elsewhere = np.abs(q - state["q_good"]) > _SAME_PLACE
+        elsewhere = np.abs(q - state["clock"]["q_good"]) > _SAME_PLACE
         if self._is_reset and not elsewhere.any():
-            return state["tau"].copy()
+            return state["command"]["tau"].copy()
         return dynamics["g"].copy()
 
     def _within_limit(self, torque) -> np.ndarray:
@@ -359,9 +356,9 @@ class Controller(Independent):
         record = self.record["target"]
         position = finite_array(target.pose.position, (3,), "pose.position")
         quat = unit_quaternion(target.pose.quat, "pose.quat")
-        stiffness = self._gain(target.stiffness, "stiffness", "1/s²", self.config.stiffness_range)
+        stiffness = self._gain(target.stiffness, "stiffness", "1/s²", self.config.impedance.stiffness_range)
         damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
-        damping = self._gain(damping, "damping", "1/s", self.config.damping_range)
+        damping = self._gain(damping, "damping", "1/s", self.config.impedance.damping_range)
         if target.posture is None:
             posture = self._ik.posture_near(Pose(position, quat), record["q_posture"].copy())
         else:
@@ -378,7 +375,7 @@ class Controller(Independent):
             i = int(np.argmax(outside))
             raise InvalidInputError(
                 f"{name}[{i}] = {gain[i]:g} {unit} is outside [{low:g}, {high:g}]; "
-                f"scale it or widen ControllerConfig.{name}_range"
+                f"scale it or widen {name}_range of the ControllerConfig"
             )
         return gain
 
@@ -396,9 +393,9 @@ class Controller(Independent):
     def _output(self) -> Output:
         out = self._reported
         contact = Contact(
-            in_contact=bool(out["mode"] == CONTACT),
+            in_contact=bool(out["mode"] != FREE),
             link=int(out["link"]),
-            holding=bool(out["holding"]),
+            kind=KINDS[int(out["kind"])],
             torque=out["residual_fast"].copy(),
         )
         return Output(
@@ -418,7 +415,7 @@ _LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum
 
 
 def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
-    """Give each field of one record as an array that shares its memory: reading and writing it is quick."""
+    """Return each field of one record as an array that shares its memory: reading and writing it is quick."""
     return {
         name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names or ()
     }
@@ -490,5 +487,5 @@ def _warm_up(arm: Arm, config: ControllerConfig) -> None:
     _WARM.add(arm.n)
     controller, q, still = Controller(arm, config), np.clip(arm.home, arm.q_min, arm.q_max), np.zeros(arm.n)
     controller.reset(q)
-    gains = np.full(6, config.stiffness_range[0]), np.full(6, config.damping_range[0])
+    gains = np.full(6, config.impedance.stiffness_range[0]), np.full(6, config.impedance.damping_range[0])
     controller.step(Measurement(q, still, np.zeros(6)), Target(arm.tool_pose(q), *gains))

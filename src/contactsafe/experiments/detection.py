@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.control import presets
+from contactsafe.control import codes, presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import (
@@ -201,7 +201,7 @@ def step_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
         trace: `trace_dtype` records from the onset on, (T,).
         push: what was done.
     """
-    reported = trace["mode"] == 1
+    reported = trace["mode"] != codes.FREE
     after_ms = float(np.argmax(reported)) if reported.any() else math.nan
     early = bool(reported[0])
     return {
@@ -217,7 +217,7 @@ def step_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
 def contact_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
     """Tell which link was named `NAMED_AFTER_MS` after the onset; arguments as for `step_metrics`."""
     named = int(trace["link"][NAMED_AFTER_MS])
-    early = bool(trace["mode"][0] == 1)
+    early = bool(trace["mode"][0] != codes.FREE)
     return {
         "link": float(push.link),
         "force_n": float(np.linalg.norm(push.force)),
@@ -265,17 +265,17 @@ def alarm_trials(arm: Arm, name: str, controller: ControllerConfig, strokes: Seq
     n, seeds = len(strokes), [stroke.seed for stroke in strokes]
     worlds = Worlds(arm, [stroke.world((), real=True) for stroke in strokes], controller, n, seeds)
     play, steps = Playback(worlds, strokes), np.zeros((n, MAX_TICKS), dtype=trace_dtype(arm.n))
-    mode, untouched = np.zeros((n, 1), int), np.ones(n, bool)
+    before, untouched = np.zeros((n, 1), int), np.ones(n, bool)
     alarms, yielding, watched = np.zeros(n), np.zeros(n), np.zeros(n)
     while play.running.any():
         ticks = play.step(steps)
         now = steps[:, :ticks]
         untouched &= np.abs(now["tau_arm"]).max(axis=(1, 2)) <= _TOUCHED_NM
-        modes = np.concatenate([mode, now["mode"]], axis=1)
-        alarms += untouched * np.count_nonzero(np.diff(modes) > 0, axis=1)
-        yielding += untouched * (now["mode"] == 1).sum(axis=1)
+        contact = np.concatenate([before, now["mode"] != codes.FREE], axis=1)
+        alarms += untouched * np.count_nonzero(np.diff(contact) > 0, axis=1)
+        yielding += untouched * contact[:, 1:].sum(axis=1)
         watched += untouched * ticks
-        mode = modes[:, -1:]
+        before = contact[:, -1:]
     worlds.close()
     return [
         Trial(

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
@@ -128,7 +129,7 @@ def contact_metrics(trace: np.ndarray) -> dict[str, float]:
     first = int(np.argmax(touching))
     found = trace["link"][first:] > 0
     detect = float(np.argmax(found)) if found.any() and not found[0] else float("nan")
-    switches = int(np.count_nonzero(np.diff(trace["mode"])))
+    switches = int(np.count_nonzero(np.diff(trace["mode"] != FREE)))
     values = (
         force.max(), force[steady].mean(), force.sum() / 1000.0, tau.max(), tau[steady].mean(), residual.max(),
         residual[steady].mean(), detect, np.linalg.norm(trace["tool_force"], axis=1).max(), switches,

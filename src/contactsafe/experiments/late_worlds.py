@@ -61,7 +61,7 @@ def _run_late(start, stop, plants, controllers, cells, noise, ticks, reports, tr
             sense(plant, controller, noise[i, k])
             code = codes[i, plant.tick]
             controller.measurement.has_time = 1 if timed else 0
-            controller.measurement.time = plant.tick * controller.params.dt
+            controller.measurement.time = plant.tick * controller.params.clock.dt
             _corrupt(controller.measurement, code, held[i])
             if code != NO_CALL:
                 control_tick(controller)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.results import Experiment, Recording, Trial
 from contactsafe.experiments.run import Progress, held_out, policy_for, run_policy
@@ -71,7 +72,7 @@ def wiping_metrics(trace: np.ndarray, clean: bool) -> dict[str, float]:
         "damping_z_free": _mean(trace["D_task"][~touching, _Z]),
         "damping_z_contact": _mean(trace["D_task"][touching, _Z]),
         "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
-        "contact_mode_fraction": float(trace["mode"].mean()),
+        "contact_mode_fraction": float((trace["mode"] != FREE).mean()),
     }
 
 

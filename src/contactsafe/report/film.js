@@ -57,7 +57,7 @@
       return {
         q: Array.from(v.subarray(0, n), (x) => x * u.q),
         obstacle: Array.from(v.subarray(n, n + 3), (x) => x * u.position),
-        force: v[n + 3] * u.force, mode: v[n + 4], holding: v[n + 5], link: v[n + 6],
+        force: v[n + 3] * u.force, mode: v[n + 4], link: v[n + 5],
       };
     }
     force(frame) {
@@ -119,7 +119,7 @@
       this.drawSpark(time, style);
       this.bar.style.width = `${Math.min(100, (100 * now.force) / this.scene.limit)}%`;
       this.value.textContent = `${now.force.toFixed(now.force < 9.95 ? 1 : 0)} N`;
-      const names = now.holding ? "holds against" : "yields to";
+      const names = now.mode === 2 ? "rejects" : "complies with";
       this.state.textContent = now.mode ? `${names} contact, link ${now.link || "–"}` : "free-space law";
       this.state.classList.toggle("on", now.mode !== 0);
     }

@@ -81,7 +81,6 @@ def _run(recording: Recording, of: str) -> dict:
             trace["obstacle_position"][ticks, 0] / POSITION_UNIT,
             force / FORCE_UNIT,
             trace["mode"][ticks],
-            trace["holding"][ticks],
             trace["link"][ticks],
         ]
     )

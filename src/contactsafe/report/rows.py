@@ -176,7 +176,7 @@ CATALOGUE: dict[str, tuple[Row, ...]] = {
         Row("tool_error_end_mm", "tool away from its free motion, at the end", "mm"),
         Row("tool_force_peak_n", "tool force, peak", "N"),
         Row("comply_fraction", "time spent yielding", "%", 100.0),
-        Row("reject_fraction", "time spent holding", "%", 100.0),
+        Row("reject_fraction", "time in mode REJECT", "%", 100.0),
         Row("mode_switches", "changes of mode", ""),
         Row("limit_touches", "touches of joint limits", ""),
         Row("met", "trials in which the obstacle was touched, mean", "%", 100.0, mean=True),

@@ -127,7 +127,7 @@ def _curves(experiment: Experiment, plotter: Plotter, info: Mapping[str, Any]) -
     if experiment.name == "collisions":
         panels = [
             Panel("contact force (N)", lambda run: run.trace["obstacle_force"]),
-            Panel("mode: 0 free, 1 yielding, 2 holding", lambda run: run.trace["mode"] * (1.0 + run.trace["holding"])),
+            Panel("mode: 0 free, 1 comply, 2 reject", lambda run: run.trace["mode"]),
             Panel("tool away from its free motion (mm)", lambda run: _length(run.trace["error"][:, :3], 1000.0)),
         ]
         drawn = [_titled(name, plotter.plot(experiment, name, panels)) for name in names]

@@ -6,7 +6,7 @@ import math
 import mujoco
 import numpy as np
 
-from contactsafe.control.laws import observer_gain
+from contactsafe.control.laws import filter_gain
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.mjcf import TOOL_SITE
@@ -126,8 +126,7 @@ def trace_dtype(n: int) -> np.dtype:
             ("tau_arm", _f, (n,)),  # true external torque less the pad's, N m
             ("residual", _f, (n,)),  # N m
             ("residual_fast", _f, (n,)),  # N m
-            ("mode", _i),
-            ("holding", _i),
+            ("mode", _i),  # of the controller: FREE, COMPLY or REJECT
             ("link", _i),
             ("ink_left", _f),  # share; filled once a policy step
         ]
@@ -164,7 +163,7 @@ def fill_plant(plant, model: mujoco.MjModel, arm: Arm, config: WorldConfig) -> N
     sensors = config.sensors
     plant["encoder_step"] = sensors.encoder_step_rad
     if math.isfinite(sensors.velocity_filter_hz):
-        plant["velocity_filter_gain"] = observer_gain(2 * math.pi * sensors.velocity_filter_hz, model.opt.timestep)
+        plant["velocity_filter_gain"] = filter_gain(2 * math.pi * sensors.velocity_filter_hz, model.opt.timestep)
     for field, value in (
         ("q_sigma", sensors.q_rad), ("qd_sigma", sensors.qd_rad_s), ("torque_sigma", sensors.torque_nm),
         ("force_sigma", sensors.force_n), ("moment_sigma", sensors.moment_nm),

@@ -67,7 +67,7 @@ def sense(plant, controller, noise):
             q = plant.encoder_step * math.floor(q / plant.encoder_step + 0.5)
         qd = qvel[i] + plant.qd_sigma * noise[n + i]
         if plant.velocity_filter_gain > 0.0:
-            rate = 0.0 if plant.tick == 0 else (q - plant.q_seen[i]) / controller.params.dt
+            rate = 0.0 if plant.tick == 0 else (q - plant.q_seen[i]) / controller.params.clock.dt
             qd = plant.qd_seen[i] + plant.velocity_filter_gain * (rate - plant.qd_seen[i])
         plant.q_seen[i], plant.qd_seen[i] = q, qd
         measurement.q[i], measurement.qd[i] = q, qd
@@ -217,17 +217,17 @@ def _measure(plant, cells, report):
 def _record(plant, controller, row):
     out = controller.output
     n = out.torque.shape[0]
-    row.time = plant.tick * controller.params.dt
+    row.time = plant.tick * controller.params.clock.dt
     row.q[:] = view1(plant.qpos, n)
     row.torque[:] = out.torque
     row.position[:] = tool_position(plant)
     row.error[:] = out.error
-    row.K_task[:] = controller.state.K_task
-    row.D_task[:] = controller.state.D_task
+    row.K_task[:] = controller.state.impedance.K_task
+    row.D_task[:] = controller.state.impedance.D_task
     row.wrench_ee[:] = controller.measurement.wrench_ee
     row.residual[:] = out.residual
     row.residual_fast[:] = out.residual_fast
-    row.mode, row.holding, row.link = out.mode, out.holding, out.link
+    row.mode, row.link = out.mode, out.link
     pad_force(plant, row.tool_force)
     row.obstacle_force = obstacle_force(plant)
     xpos = view2(plant.xpos, plant.nbody, 3)

@@ -86,5 +86,5 @@ def observe(plant, controller, camera, shown, task, mask):
     """Fill what the policy sees: the tool's pose, where it is told to be and how stiffly, the force, the mask."""
     observed_pose(controller, task.pose)
     observed_target(controller, task.pose, task.target)
-    task.force[:] = controller.state.tool_force
+    task.force[:] = controller.state.tool_wrench.force
     render_mask_into(camera, shown, plant, mask)

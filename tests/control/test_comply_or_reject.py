@@ -1,16 +1,15 @@
 """Yield to what is in the way, hold against what pushes; and never push a contact harder than the bound in force."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
 from tests.control.targets import harass
 
 from contactsafe import presets
+from contactsafe.control.codes import REJECT
 from contactsafe.control.laws import push_along
 
-SAFE = replace(presets.safe(), friction_compensation=False)
+SAFE = presets.safe().with_(friction_compensation=False)
 
 
 def collision(panda, stiffness, seconds=2.0):
@@ -28,8 +27,8 @@ def collision(panda, stiffness, seconds=2.0):
 def commanded_push(controller, out):
     """Give what the command pushes along the contact with, N m: torque less c, g and friction."""
     now, state = controller.record["dynamics"], controller.record["state"]
-    net = out.torque - now["c"] - now["g"] - state["friction"]
-    return push_along(state["direction"].copy(), now["M_inv"].copy(), net)
+    net = out.torque - now["c"] - now["g"] - state["command"]["friction"]
+    return push_along(state["isolation"]["direction"].copy(), now["M_inv"].copy(), net)
 
 
 def spring_torque(plant):
@@ -48,8 +47,8 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
         contacts.append(out.contact)
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
-    assert not any(contact.holding for contact in contacts)
-    assert 0.9 * SAFE.contact_force_limit_comply_n < np.mean(forces[-300:]) < 1.1 * SAFE.contact_force_limit_comply_n
+    assert not any(contact.kind == "push" for contact in contacts)
+    assert np.mean(forces[-300:]) == pytest.approx(SAFE.reaction.contact_force_limit_comply_n, rel=0.1)
 
 
 @pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), (20000.0, 0.12)])
@@ -73,16 +72,18 @@ def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness
     assert len(pushes) > 300
     assert (np.array(pushes) <= np.array(limits) + 1e-9).all()
     assert max(pushes) > 0.99 * min(limits)
-    assert max(limits) <= SAFE.contact_force_limit_initial_n * 0.7  # the lever arm is about half a metre
-    assert 0.2 * SAFE.contact_force_limit_comply_n < min(limits) < SAFE.contact_torque_limit_comply_nm
+    assert max(limits) <= SAFE.reaction.contact_force_limit_initial_n * 0.7  # the lever arm is about half a metre
+    assert 0.2 * SAFE.reaction.contact_force_limit_comply_n < min(limits) < SAFE.reaction.contact_torque_limit_comply_nm
 
 
 def stopped(controller, q, qd):
     """Tell whether a joint stop is in force: a joint within the margin of its range, or too fast to stay out of it."""
     params = controller.record["params"]
-    left = np.where(qd > 0, params["q_max"] - q, q - params["q_min"]) - params["joint_margin"]
-    near = np.minimum(params["q_max"] - q, q - params["q_min"]) < params["joint_margin"]
-    allowed = np.minimum(params["qd_max"], np.sqrt(2 * params["joint_deceleration"] * np.maximum(left, 0.0)))
+    left = np.where(qd > 0, params["arm"]["q_max"] - q, q - params["arm"]["q_min"]) - params["limits"]["joint_margin"]
+    near = np.minimum(params["arm"]["q_max"] - q, q - params["arm"]["q_min"]) < params["limits"]["joint_margin"]
+    allowed = np.minimum(
+        params["arm"]["qd_max"], np.sqrt(2 * params["limits"]["joint_deceleration"] * np.maximum(left, 0.0))
+    )
     return near.any() or (np.abs(qd) > allowed).any()
 
 
@@ -113,24 +114,30 @@ def test_lasting_push_is_held_against(panda, body, force):
         out = plant.run(controller, still, 1, UNTOUCHED)
         away.append(np.linalg.norm(plant.tool_position() - before))
     assert out.contact.in_contact
-    assert out.contact.holding
+    assert out.contact.kind == "push"
     assert max(away) < 0.010
     assert away[-1] < 0.004
 
 
-def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
-    """`reject_margin` times it; tried again after `hold_s`, then twice, four times as long."""
+def test_bound_in_mode_reject_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
+    """`reject_margin` times it; tried again after `reject_decay_s`, then twice, four times as long."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.push("link5", (0.0, 25.0, 0.0))
     still = hold(panda)
     state, times, held = controller.record["state"], [], []
     for k in range(4000):
         plant.run(controller, still, 1, UNTOUCHED)
-        if state["holding"] and (not times or state["hold_s"] > times[-1][1]):
-            times.append((k, float(state["hold_s"])))
-            held.append(float(state["hold_nm"]) / float(state["torque_smooth_nm"]))
-    assert [hold_s for _, hold_s in times[:3]] == [SAFE.hold_s, 2 * SAFE.hold_s, 4 * SAFE.hold_s]
-    assert held == pytest.approx([SAFE.reject_margin] * len(held), rel=0.01)
+        if state["mode"] == REJECT and (not times or state["reaction"]["reject_decay_s"] > times[-1][1]):
+            times.append((k, float(state["reaction"]["reject_decay_s"])))
+            held.append(
+                float(state["reaction"]["reject_limit_nm"]) / float(state["classification"]["torque_smooth_nm"])
+            )
+    assert [decay_s for _, decay_s in times[:3]] == [
+        SAFE.reaction.reject_decay_s,
+        2 * SAFE.reaction.reject_decay_s,
+        4 * SAFE.reaction.reject_decay_s,
+    ]
+    assert held == pytest.approx([SAFE.reaction.reject_margin] * len(held), rel=0.01)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
