@@ -1,15 +1,18 @@
 """The page on control says every parameter, every fault and nothing that the code does not."""
 
 import re
+from pathlib import Path
 
 import pytest
 from tests.docs import DOCS, program
 
+from contactsafe import control
 from contactsafe.control import classification, laws, supervision
 from contactsafe.control.codes import FAULTS
 from contactsafe.control.config import STAGE_OF
 from contactsafe.control.presets import SAFE
 
+CONTROL = Path(control.__file__).parent
 PAGE = (DOCS / "concepts" / "control.md").read_text(encoding="utf-8")
 
 
@@ -49,7 +52,7 @@ def test_every_fault_has_a_row(tables):
 
 
 def test_page_names_no_parameter_that_is_not_there():
-    known = set(STAGE_OF) | {"fault", "control_tick", "reset"}
+    known = set(STAGE_OF) | {"fault", "control_tick", "reset"} | {file.stem for file in CONTROL.glob("*.py")}
     known |= {name for module in (laws, classification, supervision) for name in vars(module)}
     named = set(re.findall(r"`([a-z]+_[a-z_]+)`", PAGE))
     assert named <= known

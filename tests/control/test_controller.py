@@ -120,11 +120,11 @@ def test_measurement_of_the_wrong_shape(panda, controller, changed, text):
         ({"stiffness": np.full(6, np.nan)}, "stiffness[0] = nan; every number must be finite"),
         (
             {"stiffness": [150, 150, 4000, 150, 150, 150]},
-            "stiffness[2] = 4000 1/s² is outside [10, 1500]; scale it or widen ControllerConfig.stiffness_range",
+            "stiffness[2] = 4000 1/s² is outside [10, 1500]; scale it or widen stiffness_range of the ControllerConfig",
         ),
         (
             {"damping": [1, 20, 20, 20, 20, 20]},
-            "damping[0] = 1 1/s is outside [2, 120]; scale it or widen ControllerConfig.damping_range",
+            "damping[0] = 1 1/s is outside [2, 120]; scale it or widen damping_range of the ControllerConfig",
         ),
         ({"damping": "soft"}, "damping is str, not numbers; give 6 finite numbers"),
         ({"posture": np.zeros(6)}, "posture has shape (6,); give 7 finite numbers"),

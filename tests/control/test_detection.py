@@ -1,6 +1,6 @@
 """When contact mode begins and ends, and what is said of the contact.
 
-An arm that stands still although g − τ is commanded is held by τ; with observers that follow at once the supervisor
+An arm that stands still although g − τ is commanded is held by τ; with observers that follow at once detection
 sees exactly that τ at every tick.
 """
 
@@ -99,7 +99,7 @@ def test_contact_is_released_only_after_quiet(panda):
         ([1.4] * 7, 0),
     ],
 )
-def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(panda, torque, link):
+def test_link_of_an_arm_without_surface_samples_is_the_furthest_joint_above_the_threshold(panda, torque, link):
     felt = Felt(replace(panda, surface=panda.surface[:0]), presets.paper())
     felt.feel(np.array(torque, dtype=float))
     assert felt.out.contact.link == link
@@ -107,7 +107,7 @@ def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(p
 
 
 @pytest.mark.parametrize("index", [215, 275, 335, 380, 430])
-def test_link_of_an_arm_with_skin_is_the_one_whose_skin_explains_the_torque(panda, index):
+def test_link_of_an_arm_with_surface_samples_is_the_one_whose_surface_explains_the_torque(panda, index):
     """The torque of 20 N on one point of the surface, not only the furthest joint that shows it."""
     row = panda.surface[index]
     bent = replace(panda, home=panda.home + np.array([0.2, 0.3, -0.4, 0.3, 0.5, 0.3, -0.2]))
@@ -145,27 +145,25 @@ def test_direction_is_that_of_the_torque_last_felt(panda):
 
 def pressing(panda, offset=0.05):
     """A target beyond an obstacle, its bound 2 N m; and the torque of an obstacle that stands before it."""
-    config = replace(
-        presets.paper(), recover_s=0.2, contact_torque_limit_comply_nm=2.0, contact_force_limit_initial_n=0.0
-    )
+    config = presets.paper().with_(recover_s=0.2, contact_torque_limit_comply_nm=2.0, contact_force_limit_initial_n=0.0)
     obstacle = panda.dynamics(panda.home, np.zeros(7))["J"][1] * -20.0
     return Felt(panda, config, reach(panda, [0.0, offset, 0.0])), obstacle
 
 
-def test_tasks_pull_gives_way_at_once_and_comes_back_slowly(panda):
-    """Scaled as a whole until contact ends, then 1 − (1 − share) exp(−t/recover_s) of it."""
+def test_task_yields_at_once_and_comes_back_slowly(panda):
+    """Scaled as a whole until contact ends, then 1 − (1 − scale) exp(−t/recover_s) of it."""
     felt, obstacle = pressing(panda)
     state = felt.controller.record["state"]
     assert state["reaction"]["task_scale"] == 1.0
     felt.feel(obstacle)
-    share = float(state["reaction"]["task_scale"])
-    assert share < 0.9
+    scale = float(state["reaction"]["task_scale"])
+    assert scale < 0.9
     modes = felt.feel(obstacle, 100) + felt.feel(np.zeros(7), 250)
     assert modes == [True] * 100 + [False] * 250
-    assert_allclose(state["reaction"]["task_scale"], 1 - (1 - share) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
+    assert_allclose(state["reaction"]["task_scale"], 1 - (1 - scale) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
 
 
-def test_task_pulls_whole_again_at_once_where_nothing_delays_it(panda):
+def test_task_is_whole_again_at_once_where_nothing_delays_it(panda):
     felt, obstacle = pressing(panda)
     felt.controller.record["params"]["one_tick"]["recover_gain"] = 1.0
     felt.feel(obstacle, 100)

@@ -10,7 +10,8 @@ from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
 from tests.control.targets import hostile_target
 
 from contactsafe import Measurement, Pose, Target, presets
-from contactsafe.control.limits import passive_step, power_limit
+from contactsafe.control.impedance import passive_step
+from contactsafe.control.limits import power_limit
 
 SAFE = presets.safe().with_(friction_compensation=False)
 ALPHA, DT = 2.0, 0.001

@@ -8,9 +8,9 @@ from contactsafe.core.linalg import matvec_into
 from contactsafe.core.stack import stack_vector
 
 _HASTE = 0.8
-"""Share of what is too fast from which the brake takes over, gradually."""
+"""Fraction of what is too fast from which the brake takes over, gradually."""
 
-_SHARE = 0.25
+_USABLE = 0.25
 """Of torque and torque rate that each of the two brakes may use; the rest is for gravity and what they do not know."""
 
 
@@ -74,4 +74,4 @@ def _followed(momentum, tau_max, torque_rate):
     """
     if momentum == 0.0:
         return math.inf
-    return min(math.sqrt(2.0 * _SHARE * torque_rate / momentum), _SHARE * tau_max / momentum)
+    return min(math.sqrt(2.0 * _USABLE * torque_rate / momentum), _USABLE * tau_max / momentum)

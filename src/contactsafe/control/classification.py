@@ -1,6 +1,6 @@
 """Classification: whether a contact is an obstacle, a push on the arm, or the tool's own.
 
-An obstacle and a push look alike to the residual. They differ in what giving way brings: the torque of an obstacle
+An obstacle and a push look alike to the residual. They differ in what receding brings: the torque of an obstacle
 falls, that of a push goes on. `docs/concepts/control.md` has the states.
 """
 
@@ -91,7 +91,7 @@ def _follow_contact(classification, direction, torque, step):
 
 @compiled
 def is_push(drop, displacement, lever, stiffness):
-    """Tell a push on the arm from an obstacle in its path, by what giving way to it brings.
+    """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
     The torque of a spring of k N/m at a lever arm of l falls by k l² for every radian that the arm recedes; a push goes
     on. Half the fall that the softest obstacle would show draws the line.

@@ -197,5 +197,5 @@ def set_step(step, one_tick, ticks):
 
 @compiled
 def _over(gain, ticks):
-    """Return the fraction of its way that a first-order filter goes in so many ticks, from that of one."""
+    """Return the fraction of a step that a first-order filter takes up in so many ticks, from that of one."""
     return gain if ticks == 1.0 else 1.0 - (1.0 - gain) ** ticks

@@ -1,7 +1,7 @@
 """Numbers that stand for words in the records: modes, kinds of contact, faults, what limited a command."""
 
 FREE, COMPLY, REJECT = 0, 1, 2
-"""Modes: no contact on the arm; it gives way to an obstacle; it resists a push."""
+"""Modes: no contact on the arm; it complies with an obstacle; it rejects a push."""
 
 NO_CONTACT, OBSTACLE, PUSH, TOOL = 0, 1, 2, 3
 KINDS = {NO_CONTACT: "none", OBSTACLE: "obstacle", PUSH: "push", TOOL: "tool"}

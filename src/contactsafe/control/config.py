@@ -85,7 +85,7 @@ class IdentificationConfig(Stage):
 class ClassificationConfig(Stage):
     """What tells a push from an obstacle, and a contact of the tool from none."""
 
-    probe_m: float = parameter(0.002, "m", "displacement by which the arm gives way before a contact is classified")
+    probe_m: float = parameter(0.002, "m", "displacement by which the arm recedes before a contact is classified")
     probe_s: float = parameter(
         0.01, "s", "time constant with which torque, displacement and the force at the tool are smoothed for that"
     )

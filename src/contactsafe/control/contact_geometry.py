@@ -21,7 +21,7 @@ _NO_LEVER = 1e-9  # m; a point with less explains no torque, and its square may 
 
 @compiled
 def contact_lever(handle, link, direction):
-    """Give the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
+    """Return the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
 
     With J_p the Jacobian of the link's centre of mass, the least force there that explains a joint torque τ is
     (J_p J_pᵀ)⁻¹ J_p τ; a little damping keeps it finite where the link cannot be moved along some axis. The handle

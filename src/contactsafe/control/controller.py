@@ -29,7 +29,7 @@ _STILL_RAD_S = 0.15
 """Joints that are faster show friction and inertia as well as weight."""
 
 _LEAST_KG = 0.01
-"""A load that weighs less is none."""
+"""A lighter load is none."""
 
 _SAME_PLACE = 0.5
 """An arm that is less than this away from where it was last measured, rad, may have got there by itself."""
@@ -77,9 +77,10 @@ class Contact(NamedTuple):
         in_contact: whether the contact-aware law is in force.
         link: found in contact on the arm's surface, or without one the furthest whose joint residual exceeds the
             threshold, 1 … n; 0 for none.
-        kind: 'obstacle', to which the arm gives way, or 'push', which it resists: one on the arm counts as an obstacle
-            until giving way has shown that it pushes; 'tool' where the tool alone touches something; 'none'.
-        torque: estimated joint torque of the contact, (n,), N m (the triggering residual).
+        kind: 'obstacle', with which the arm complies, or 'push', which it rejects: one on the arm counts as an
+            obstacle until receding from it has shown that it pushes; 'tool' where the tool alone touches something;
+            'none'.
+        torque: estimated joint torque of the contact, (n,), N m (the fast residual).
     """
 
     in_contact: bool

@@ -83,7 +83,7 @@ def loosen_limits(M_inv, rate, limits):
 
 @compiled
 def scale_damping_into(damping, limits, out):
-    """Fill the share of its damping that every joint may have, (n,), 0 … 1.
+    """Fill the fraction of its damping that every joint may have, (n,), 0 … 1.
 
     Args:
         damping: all that is asked of a joint, (n,), N m s/rad.

@@ -49,17 +49,20 @@ def limit_command(c, tau):
     """Keep a command within all limits, in place; return what took something off it, a sum of keys of LIMITS.
 
     Joints are stopped from what the motors can do, not from what is wanted of them: torque is limited first, and last
-    once more, with its rate.
+    once more, with its rate. Motors carry c and g as well, joint stops do without, and the energy tank pays for c: they
+    are added and taken off here and nowhere else.
 
     Args:
         c: `controller_dtype` record; its `limits` and `command` are advanced.
-        tau: command, c and g included, (n,), N m; updated.
+        tau: command less c and g, (n,), N m; updated: what is sent, with them and friction compensation.
 
     Returns:
         Limits met; and whether all numbers of the command were finite.
     """
     state, dynamics, params = c.state, c.dynamics, c.params
     command, step = state.command, state.step
+    tau += dynamics.c
+    tau += dynamics.g
     finite = replace_unusable(tau, command.tau)
     clipped = limit_torque(tau, command.tau, params.arm.tau_max, math.inf, dynamics.M_inv)
     tau -= dynamics.g + dynamics.c
@@ -156,14 +159,14 @@ def _slow_down(limits, qd, dynamics, params, tau):
 
 
 @compiled
-def power_limit(tau_net, M, qd, tank, power, drain_s):
+def power_limit(tau, M, qd, tank, power, drain_s):
     """Damp a command in place so that it gives the arm no more power than a tank of energy can pay.
 
     The tank is filled with a steady power and by what the command takes out of the arm. Its level falls no faster than
     level/drain_s beyond that power; what is taken off brakes all joints alike, along M q̇: it turns no light joint back.
 
     Args:
-        tau_net: command less gravity and Coriolis torque, (n,), N m; updated.
+        tau: command less gravity torque, (n,), N m; updated.
         M: joint inertia, (n, n), kg m².
         qd: (n,), rad/s.
         tank: level, J.
@@ -174,7 +177,7 @@ def power_limit(tau_net, M, qd, tank, power, drain_s):
         True where anything was taken off.
     """
     allowed = power + max(tank, 0.0) / drain_s
-    given = dot(tau_net, qd)
+    given = dot(tau, qd)
     if given <= allowed:
         return False
     momentum = matvec_into(M, qd, stack_vector(qd.shape[0]))
@@ -182,7 +185,7 @@ def power_limit(tau_net, M, qd, tank, power, drain_s):
     if energy <= _STILL:
         return False
     for i in range(qd.shape[0]):
-        tau_net[i] -= (given - allowed) / energy * momentum[i]
+        tau[i] -= (given - allowed) / energy * momentum[i]
     return True
 
 
@@ -216,7 +219,7 @@ def limit_torque(tau, tau_previous, tau_max, step_max, M_inv):
 
 @compiled
 def _bounds(tau_previous, tau_max, step_max):
-    """Give what a torque may be: within the limit, even where the last one was beyond it."""
+    """Return what a torque may be: within the limit, even where the last one was beyond it."""
     low = min(max(tau_previous - step_max, -tau_max), tau_max)
     return low, max(min(tau_previous + step_max, tau_max), -tau_max)
 

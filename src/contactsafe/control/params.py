@@ -18,7 +18,7 @@ UNKNOWN_SPEED_LIMIT = 4.0 * math.pi
 """Speed limit of a joint whose own is not known, rad/s: two turns a second, more than arms of a person's size do."""
 
 OUTSIDE_RAD = 0.5
-"""A joint measured further outside its range than this is not there: no stop gives way so far."""
+"""A joint measured further outside its range than this is not there: no stop yields so far."""
 
 _TURNS_RAD = 1e4
 """Joints that turn without end are believed to have turned so far."""
@@ -30,7 +30,7 @@ step_dtype = np.dtype(
     [
         ("ticks", _f),
         ("dt", _f),  # s
-        # fraction of its way that a first-order filter goes
+        # fractions of a step that first-order filters take up
         ("detection_filter_gain", _f),
         ("compensation_filter_gain", _f),
         ("lowpass_gain", _f),
@@ -85,7 +85,7 @@ def _fill_resolved(params: np.void, config: ControllerConfig, arm: Arm) -> None:
     dt, detection, impedance = config.clock.dt, config.detection, params["impedance"]
     mobility = best_mobility(arm)
     impedance["manipulability_damping"] *= mobility.mean
-    # An arm that can never move its tool every way is singular wherever it is.
+    # An arm that can never move its tool in all directions is singular wherever it is.
     impedance["manipulability_floor"] *= mobility.mean**6
     if mobility.directions < 6:
         impedance["manipulability_floor"] = math.inf
@@ -135,7 +135,7 @@ def _speed_gained(arm: Arm) -> np.ndarray:
 
 
 def fraction_per_tick(time_constant_s: float, dt: float) -> float:
-    """Return the fraction of its way that a first-order filter goes in one tick; 1 where its time constant is 0."""
+    """Return the fraction of a step that a first-order filter takes up in one tick; 1 where its time constant is 0."""
     return 1.0 - math.exp(-dt / time_constant_s) if time_constant_s > 0 else 1.0
 
 

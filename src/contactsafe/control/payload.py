@@ -32,7 +32,7 @@ _SETTLE_S = 0.2
 """Until then the observer shows what was before."""
 
 _SMOOTH_S = 0.3
-"""Time over which it is judged whether a load explains the torques: each joint is read many times in it."""
+"""Time over which it is decided whether a load explains the torques: each joint is read many times in it."""
 
 _UNEXPLAINED = 0.25
 """A load explains the torques but for this fraction of their squares."""

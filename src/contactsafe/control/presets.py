@@ -45,7 +45,7 @@ SAFE: dict[str, tuple[float | bool, str]] = {
     "contact_force_limit_comply_n": (2.5, "less than what pushes a light obstacle along"),
     "contact_force_limit_reject_n": (45.0, "a little more than the pushes of 40 N that the tool must withstand"),
     "contact_force_limit_initial_n": (17.0, "a push that begins must not displace the tool before it is classified"),
-    "tool_force_limit_n": (20.0, "room for what a tool needs; a policy can press no harder"),
+    "tool_force_limit_n": (20.0, "room for what a tool needs; a policy can press with no more"),
     "probe_m": (0.0005, "the shortest displacement that stands out of the noise: the tool hardly moves under a push"),
     "joint_margin": (0.2, "room to stop before the limit, whatever the policy asks"),
     "joint_speed_fraction": (0.6, "what runs into something at full speed cannot be stopped by any law"),

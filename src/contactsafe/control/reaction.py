@@ -1,7 +1,7 @@
 """Reaction: the contact-aware law (18), (21), (22), and what keeps the commanded contact force within its bound.
 
-Mode FREE leaves the impedance alone; COMPLY gives way to an obstacle; REJECT resists a push. First the compensation
-gives way to the bound, then the task as a whole, last the damping.
+Mode FREE leaves the impedance alone; COMPLY recedes from an obstacle; REJECT resists a push. The bound lowers
+the compensation first, then the task as a whole, last the damping.
 """
 
 import math
@@ -65,7 +65,7 @@ def react(reaction, mode, shown, torque_nm, dt, params):
     )
     if shown == PUSH:
         fallen = 0.5 * (1.0 + params.reject_margin) * torque_nm
-        if mode == COMPLY or reaction.reject_limit_nm < fallen:  # it gave way because the bound had fallen
+        if mode == COMPLY or reaction.reject_limit_nm < fallen:  # it receded because the bound had fallen
             reaction.reject_decay_s = max(2.0 * reaction.reject_decay_s, params.reject_decay_s)
         mode, reaction.reject_limit_nm = REJECT, params.reject_margin * torque_nm
     elif shown == OBSTACLE:
@@ -109,7 +109,7 @@ def follow_posture_scale(reaction, mode, recover_gain, params):
 
 @compiled
 def tool_task_scale(F_spring, force, contact_n, limit_n):
-    """Return the task scale with which the tool presses no harder than a bound on what it touches, and its reason.
+    """Return the task scale with which the tool presses within a bound on what it touches, and its reason.
 
     Args:
         F_spring: task stiffness force, (6,), N and N m.
@@ -140,7 +140,7 @@ def compensate_disturbance(J, J_bar, arm_torque, out):
 
 @compiled
 def bound_compensation(compensation, direction, M_inv, limit):
-    """Scale a compensation in place so that it presses no harder than a bound; return what it asked for, N m."""
+    """Scale a compensation in place so that it presses within a bound; return what it asked for, N m."""
     asked = push_along(direction, M_inv, compensation)
     if asked > limit:
         for i in range(compensation.shape[0]):
@@ -150,7 +150,7 @@ def bound_compensation(compensation, direction, M_inv, limit):
 
 @compiled
 def scale_of_task(elastic_push, left, scale, reason):
-    """Return the task scale with which the elastic part presses no harder than what is left of a bound; its reason."""
+    """Return the task scale with which the elastic part presses within what is left of a bound; its reason."""
     if elastic_push > 0.0 and left / elastic_push < scale:
         return left / elastic_push, LIMITED_BY_CONTACT
     return scale, reason
@@ -167,7 +167,7 @@ def remove_excess(tau, direction, M_inv, limit):
 
 @compiled
 def damp_approach(tau, direction, qd, M, joint_damping, rate, damping):
-    """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no harder than the sampled loop takes.
+    """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
 
     Args:
         tau: command less c and g, (n,), N m; updated.

@@ -70,7 +70,7 @@ def control_tick(c):
     set_step(state.step, c.params.one_tick, state.clock.elapsed)
     tau = _law(c, Lambda, J_bar)
     if state.clock.braking != 0:
-        tau = stop_torque(c) + dynamics.c + dynamics.g
+        tau = stop_torque(c)
     _send(c, tau)
 
 
@@ -117,7 +117,7 @@ def _start(c):
 
 @compiled
 def _estimate(c, J_bar):
-    """Estimate what touches the arm, from residual to mode, and what it weighs, over the time since it was measured."""
+    """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
     state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
     detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
     set_step(state.step, params.one_tick, min(state.clock.since, BRIDGE_TICKS + 1.0))
@@ -148,7 +148,7 @@ def _estimate(c, J_bar):
 
 @compiled
 def _law(c, Lambda, J_bar):
-    """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; tau_m as a model asks, (n,)."""
+    """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; without c and g, (n,), N m."""
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
     arm, impedance, react, tool = state.arm, state.impedance, state.reaction, state.tool_wrench
     n = arm.q.shape[0]
@@ -173,11 +173,9 @@ def _law(c, Lambda, J_bar):
     if state.mode == FREE:
         c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
         reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
-        tau = react.task_scale * elastic + damping - state.link_masses.gravity_correction
-    else:
-        compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
-        tau = _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
-    return tau + dynamics.c + dynamics.g
+        return react.task_scale * elastic + damping - state.link_masses.gravity_correction
+    compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
+    return _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
 
 
 @compiled
@@ -214,7 +212,7 @@ def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
 
 @compiled
 def _send(c, tau):
-    """Limit the command, remember it and report."""
+    """Limit the command, given without c and g; remember it and report."""
     state, dynamics, out = c.state, c.dynamics, c.output
     scaled = state.reaction.task_scale
     limited_by = state.reaction.scale_reason if scaled < 1.0 else 0
