@@ -10,7 +10,7 @@ import numpy as np
 
 from contactsafe.control.codes import COMPLY, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
 from contactsafe.control.laws import observer_step
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
 _f = np.float64
@@ -34,7 +34,7 @@ def classification_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def follow_velocity(classification, qd, step):
     """Filter the joint velocity as the torque is, or the torque's lag would look like a push."""
     observer_step(classification.velocity_unfiltered, step.detection_filter_gain, qd)
@@ -49,7 +49,7 @@ def begin_classification(classification):
     classification.decision_rad = math.inf
 
 
-@compiled
+@inlined
 def classify(classification, direction, lever, torque, mode, step, params):
     """Return what the contact has shown itself to be in this tick: OBSTACLE, PUSH, or NO_CONTACT for nothing new.
 
@@ -79,7 +79,7 @@ def classify(classification, direction, lever, torque, mode, step, params):
     return NO_CONTACT if mode == REJECT and displacement < _CERTAIN * probe else OBSTACLE
 
 
-@compiled
+@inlined
 def _follow_contact(classification, direction, torque, step):
     """Follow how far the arm has receded along the contact, and the contact's torque meanwhile."""
     classification.displacement_rad += step.dt * dot(direction, classification.velocity)

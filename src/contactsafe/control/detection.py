@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.friction import joint_friction_into
 
@@ -26,7 +26,7 @@ def detection_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def set_thresholds(detection, observer, gravity_sigma, qd, CT_qd, params, friction_coefficients):
     """Set each joint's threshold to what is not known of the arm.
 
@@ -51,7 +51,7 @@ def set_thresholds(detection, observer, gravity_sigma, qd, CT_qd, params, fricti
         detection.threshold[i] = params.residual_threshold + uncertainty + _SIGMAS * gravity_sigma[i]
 
 
-@compiled
+@inlined
 def detect(detection, in_contact, ticks, params):
     """Return the furthest link whose joint exceeds its threshold, and whether the arm is in contact from now on.
 

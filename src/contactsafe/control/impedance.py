@@ -13,7 +13,7 @@ from contactsafe.control.damping import (
     task_damping_into,
 )
 from contactsafe.control.laws import damping_wrench, stiffness_wrench
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into, shorten
 from contactsafe.core.stack import stack_vector
 
@@ -56,7 +56,7 @@ def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
         D[i] += fraction * (D_wanted[i] - D[i])
 
 
-@compiled
+@inlined
 def follow_gains(impedance, target, dt, params):
     """Move the gains in force towards those of the target."""
     passive_step(
@@ -65,7 +65,7 @@ def follow_gains(impedance, target, dt, params):
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def task_wrenches(impedance, Lambda, error, dynamics, delay_s, params):
     """Return elastic and damping wrench at the tool, (4), (6,) each, N and N m; and note the largest damping.
 
@@ -85,7 +85,7 @@ def task_wrenches(impedance, Lambda, error, dynamics, delay_s, params):
     return F_spring, damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
 
 
-@compiled
+@inlined
 def set_joint_damping(impedance, mode, M_inv, params):
     """Set the part of each joint's damping that its inertia takes beside the damping of the task.
 
@@ -109,7 +109,7 @@ def set_joint_damping(impedance, mode, M_inv, params):
         impedance.joint_damping[i] *= impedance.damping_scale[i]
 
 
-@compiled
+@inlined
 def posture_torques_into(impedance, arm, q_posture, scale, params, elastic, damping):
     """Fill elastic and damping torque of the posture task, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m.
 
@@ -131,7 +131,7 @@ def posture_torques_into(impedance, arm, q_posture, scale, params, elastic, damp
         damping[i] = -D * arm.qd[i]
 
 
-@compiled
+@inlined
 def compose_into(J, wrench, N, posture, out):
     """Fill Jᵀ F + Nᵀ Γ, (n,), N m: a task, and a posture in a null space of it."""
     n = out.shape[0]

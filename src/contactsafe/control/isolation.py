@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.contact_geometry import best_point, contact_lever, surface_torque
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
 _f = np.float64
@@ -36,7 +36,7 @@ def isolation_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def isolate(isolation, handle, link, torque):
     """Take the direction from the contact's torque, and look for its place on the surface.
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.damping import joint_damping_limits
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into, spd_inverse
 from contactsafe.core.stack import stack_matrix, stack_vector
 
@@ -33,7 +33,7 @@ def stops_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def predict_velocity(stops, qd, M_inv, momentum_rate, step_max, dt):
     """Fill the speed that joints will have before the torque that drives them can be taken off, and the horizon.
 
@@ -57,7 +57,7 @@ def predict_velocity(stops, qd, M_inv, momentum_rate, step_max, dt):
         stops.speed[i] += qd[i]
 
 
-@compiled
+@inlined
 def joint_excess(stops, q, qd, arm, margin, deceleration):
     """Fill by how much each joint is too fast and too far, signed by its direction; tell whether any is.
 

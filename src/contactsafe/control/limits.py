@@ -14,7 +14,7 @@ from contactsafe.control.joint_stops import (
     stops_dtype,
 )
 from contactsafe.control.plausibility import all_usable
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.friction import joint_friction_into
@@ -44,7 +44,7 @@ def limits_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def limit_command(c, tau):
     """Keep a command within all limits, in place; return what took something off it, a sum of keys of LIMITS.
 
@@ -87,7 +87,7 @@ def limit_command(c, tau):
     return limited_by | LIMITED_BY_RATE if clipped else limited_by, finite
 
 
-@compiled
+@inlined
 def replace_unusable(tau, tau_previous):
     """Repeat the last command in place where a law gave none that is finite; tell whether it was finite."""
     if all_usable(tau):
@@ -96,14 +96,14 @@ def replace_unusable(tau, tau_previous):
     return False
 
 
-@compiled
+@inlined
 def fill_tank(limits, command, g, qd, dt, params):
     """Take what the command gives the arm out of the tank, and add the steady power."""
     given = dot(command.tau - command.friction - g, qd)
     limits.tank_j = min(limits.tank_j + dt * (params.tank_power_w - given), params.tank_j)
 
 
-@compiled
+@inlined
 def runs_away(limits, qd, M, dt, arm):
     """Tell whether a joint stays beyond its speed limit for longer than braking it takes.
 
@@ -125,7 +125,7 @@ def runs_away(limits, qd, M, dt, arm):
     return some
 
 
-@compiled
+@inlined
 def _stop_joints(stops, arm, impedance, dynamics, params, tau_net):
     """Keep joints in their range and below their speed limits, in place; tell whether that took anything."""
     known = params.limits
@@ -140,7 +140,7 @@ def _stop_joints(stops, arm, impedance, dynamics, params, tau_net):
     return True
 
 
-@compiled
+@inlined
 def _slow_down(limits, qd, dynamics, params, tau):
     """Brake the whole arm in place of the command as far as it is too fast; tell whether that took anything.
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.laws import identify_masses
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import mass_regressor
@@ -58,7 +58,7 @@ def reset_link_masses(masses, variance):
         masses.covariance[j, j] = variance[j]
 
 
-@compiled
+@inlined
 def correct_gravity(masses, dynamics, handle, has_wrench, variance):
     """Add what the links were found to be heavier than the model says to the model's gravity torque.
 
@@ -82,7 +82,7 @@ def correct_gravity(masses, dynamics, handle, has_wrench, variance):
         dynamics.g[i] += masses.gravity_correction[i]
 
 
-@compiled
+@inlined
 def identify_link_masses(masses, i, residual, model_uncertainty, row, dt, untouched, variance):
     """Identify the links' masses from joint i's residual, where nothing touches the arm and a sensor shows the tool.
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from contactsafe.control.laws import momentum_into, observer_step
 from contactsafe.control.plausibility import BRIDGE_TICKS
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
 
@@ -51,7 +51,7 @@ def start_observer(observer, command, dynamics, qd):
         observer.tau_before[i] = command.tau[i]
 
 
-@compiled
+@inlined
 def observe(observer, arm, clock, step, command, dynamics, params):
     """Raw external torque since the last good measurement, two observers of it, a low-pass behind each.
 
@@ -92,7 +92,7 @@ def observe(observer, arm, clock, step, command, dynamics, params):
     observer_step(observer.torque_ramp, step.lowpass_gain, observer.torque_ramp_unfiltered)
 
 
-@compiled
+@inlined
 def _add_impulse(observer, elapsed, command, dynamics):
     """Add what the command did in the ticks that passed, less friction and β, the mean of then and now."""
     observer.impulse_ticks += elapsed

@@ -19,7 +19,7 @@ from contactsafe.control.codes import (
 )
 from contactsafe.control.damping import braking_limit
 from contactsafe.control.laws import push_along
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_t_into
 from contactsafe.core.stack import stack_vector
 
@@ -48,7 +48,7 @@ def begin_reaction(reaction):
     reaction.reject_decay_s, reaction.reject_limit_nm, reaction.initial_limit_n = 0.0, 0.0, math.inf
 
 
-@compiled
+@inlined
 def react(reaction, mode, shown, torque_nm, dt, params):
     """Return the mode that what a contact has shown asks for, and let the bounds in force fall.
 
@@ -75,7 +75,7 @@ def react(reaction, mode, shown, torque_nm, dt, params):
     return mode
 
 
-@compiled
+@inlined
 def contact_limit(reaction, isolation, params):
     """Return the bound in force, N m: a torque, and what a force comes to with the lever arm that isolation found."""
     comply = min(params.contact_torque_limit_comply_nm, params.contact_force_limit_comply_n * isolation.lever)
@@ -86,7 +86,7 @@ def contact_limit(reaction, isolation, params):
     return max(comply, min(reject, params.contact_torque_limit_reject_nm))
 
 
-@compiled
+@inlined
 def follow_task_scale(reaction, mode, wanted, reason, step):
     """Let the task scale fall at once and come back slowly, fast in mode REJECT; say what lowered it."""
     if wanted < reaction.task_scale:
@@ -98,7 +98,7 @@ def follow_task_scale(reaction, mode, wanted, reason, step):
         reaction.scale_reason = reason
 
 
-@compiled
+@inlined
 def follow_posture_scale(reaction, mode, recover_gain, params):
     """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
     if mode == FREE:
@@ -107,7 +107,7 @@ def follow_posture_scale(reaction, mode, recover_gain, params):
         reaction.posture_scale = params.posture_scale
 
 
-@compiled
+@inlined
 def tool_task_scale(F_spring, force, contact_n, limit_n):
     """Return the task scale with which the tool presses within a bound on what it touches, and its reason.
 
@@ -128,7 +128,7 @@ def tool_task_scale(F_spring, force, contact_n, limit_n):
     return (1.0, 0) if pressed <= limit_n else (limit_n / pressed, LIMITED_BY_TOOL_FORCE)
 
 
-@compiled
+@inlined
 def compensate_disturbance(J, J_bar, arm_torque, out):
     """Fill −Jᵀ J#ᵀ residual of (18), (n,), N m: what takes from the task what the contact does to the tool."""
     F_arm = matvec_t_into(J_bar, arm_torque, stack_vector(6))
@@ -138,7 +138,7 @@ def compensate_disturbance(J, J_bar, arm_torque, out):
     return out
 
 
-@compiled
+@inlined
 def bound_compensation(compensation, direction, M_inv, limit):
     """Scale a compensation in place so that it presses within a bound; return what it asked for, N m."""
     asked = push_along(direction, M_inv, compensation)
@@ -148,7 +148,7 @@ def bound_compensation(compensation, direction, M_inv, limit):
     return asked
 
 
-@compiled
+@inlined
 def scale_of_task(elastic_push, left, scale, reason):
     """Return the task scale with which the elastic part presses within what is left of a bound; its reason."""
     if elastic_push > 0.0 and left / elastic_push < scale:
@@ -156,7 +156,7 @@ def scale_of_task(elastic_push, left, scale, reason):
     return scale, reason
 
 
-@compiled
+@inlined
 def remove_excess(tau, direction, M_inv, limit):
     """Take off a command in place what it presses along the contact beyond a bound, a (s − s_max)."""
     excess = push_along(direction, M_inv, tau) - limit
@@ -165,7 +165,7 @@ def remove_excess(tau, direction, M_inv, limit):
             tau[i] += excess * direction[i]
 
 
-@compiled
+@inlined
 def damp_approach(tau, direction, qd, M, joint_damping, rate, damping):
     """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
 
@@ -185,7 +185,7 @@ def damp_approach(tau, direction, qd, M, joint_damping, rate, damping):
             tau[i] -= d * approach * direction[i]
 
 
-@compiled
+@inlined
 def damp_contact(damping, N_removed, qd, scale, params):
     """Add damping in the null-space direction that the contact takes out, and in all joints, in place.
 

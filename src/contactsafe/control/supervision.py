@@ -5,10 +5,10 @@ from contactsafe.control.codes import COMPLY, FREE
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 
 
-@compiled
+@inlined
 def supervise(c):
     """Detect, isolate and classify a contact, and choose the mode.
 

@@ -4,11 +4,11 @@ import math
 
 from contactsafe.control.codes import BAD_GAIN, BAD_QUATERNION, BAD_TARGET
 from contactsafe.control.plausibility import all_usable
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
 
-@compiled
+@inlined
 def accept_target(held, target, params):
     """Take a target over where it is new and sound; return the fault where it is not, 0 for none.
 

@@ -36,7 +36,7 @@ from contactsafe.control.stopping import stop_late_target, stop_torque
 from contactsafe.control.supervision import supervise
 from contactsafe.control.target import accept_target
 from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matmul
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
@@ -115,7 +115,7 @@ def _start(c):
     reset_payload(state.payload)
 
 
-@compiled
+@inlined
 def _estimate(c, J_bar):
     """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
     state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
@@ -146,7 +146,7 @@ def _estimate(c, J_bar):
     state.clock.since = 0.0
 
 
-@compiled
+@inlined
 def _law(c, Lambda, J_bar):
     """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; without c and g, (n,), N m."""
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
@@ -178,7 +178,7 @@ def _law(c, Lambda, J_bar):
     return _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
 
 
-@compiled
+@inlined
 def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
     """Bound the commanded contact force: by compensation, task scale and, last, damping; then damp the approach.
 
@@ -210,7 +210,7 @@ def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
     return tau
 
 
-@compiled
+@inlined
 def _send(c, tau):
     """Limit the command, given without c and g; remember it and report."""
     state, dynamics, out = c.state, c.dynamics, c.output

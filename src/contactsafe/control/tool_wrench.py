@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import inlined
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
 
@@ -22,7 +22,7 @@ def tool_wrench_dtype(n: int) -> np.dtype:
     )
 
 
-@compiled
+@inlined
 def separate_tool_wrench(tool, detection_residual, observer, J, J_bar, memory_gain, params):
     """Split the residual into the tool's part and the arm's, where no force sensor does.
 
@@ -54,7 +54,7 @@ def separate_tool_wrench(tool, detection_residual, observer, J, J_bar, memory_ga
         tool.arm_torque_fast[i] = observer.residual_fast[i] - tau_tool[i]
 
 
-@compiled
+@inlined
 def take_all_for_the_arm(tool, detection_residual, observer):
     """Take all of the residual for the arm's contact: the tool's wrench is known, or nothing tells it apart."""
     detection_residual[:] = observer.residual_fast
@@ -62,7 +62,7 @@ def take_all_for_the_arm(tool, detection_residual, observer):
     tool.arm_torque_fast[:] = observer.residual_fast
 
 
-@compiled
+@inlined
 def follow_tool_force(tool, arm, residual_fast, J_bar, gain):
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r."""
     wrench = stack_vector(6)
