@@ -75,10 +75,15 @@ def _check_numbers(declared: Field, value: Any) -> None:
     if known.per_joint:
         fits, wanted = numbers.ndim == 1 and numbers.size > 0, "one number a joint"
     else:
-        shape = np.shape(declared.default)
+        shape = _shape(declared)
         fits, wanted = numbers.shape == shape, "(lowest, highest)" if shape else "one number"
     if not fits:
         raise InvalidInputError(f"{name} = {value} has the wrong shape; give {wanted}")
+
+
+def _shape(declared: Field) -> tuple[int, ...]:
+    default: Any = declared.default
+    return np.shape(default)
 
 
 def _check_bounds(declared: Field, value: Any) -> None:
@@ -101,7 +106,7 @@ def _record_field(declared: Field, n: int) -> tuple:
         return declared.name, _i
     if declaration(declared).per_joint:
         return declared.name, _f, (n,)
-    return declared.name, _f, np.shape(declared.default)
+    return declared.name, _f, _shape(declared)
 
 
 def fill_record(record: Any, stage: Stage) -> None:
