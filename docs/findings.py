@@ -17,7 +17,13 @@ import numpy as np
 
 import contactsafe as cs
 from contactsafe.control.codes import FREE, REJECT
-from contactsafe.control.laws import contact_nullspace, push_along, stiffness_wrench, task_inertia, task_nullspace
+from contactsafe.control.laws import (
+    contact_nullspace,
+    stiffness_wrench,
+    task_inertia,
+    task_nullspace,
+    torque_against_contact,
+)
 from contactsafe.experiments.collision_scenes import clearance, description_and_tool, sample_meetings, sample_motion
 from contactsafe.experiments.collisions import run_battery
 from contactsafe.experiments.detection import CONTACT, alarm_trials, paint_strokes, point_torque, sample_push
@@ -408,7 +414,7 @@ class _ForceAdded(Worlds):
         tau, step = command["tau"].copy(), self.arm.torque_rate_max / 1000.0
         if self.controllers[i]["output"]["mode"] != FREE:
             net = tau - now["c"] - now["g"] - command["friction"]
-            over = push_along(direction.copy(), now["M_inv"].copy(), net) - self.bound_nm
+            over = torque_against_contact(direction.copy(), now["M_inv"].copy(), net) - self.bound_nm
             tau += max(over, 0.0) * direction
         tau = np.clip(np.clip(tau, before - step, before + step), -self.arm.tau_max, self.arm.tau_max)
         command["tau"] = self.plants[i]["tau_delayed"] = tau

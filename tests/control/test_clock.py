@@ -51,8 +51,8 @@ def sweep(panda):
     """Give the targets of a tool that goes 11 cm in half a second and stays there."""
 
     def target(k):
-        share = min(k / 500, 1.0)
-        return reach(panda, [0.0, 0.1 * share, 0.05 * share])
+        fraction = min(k / 500, 1.0)
+        return reach(panda, [0.0, 0.1 * fraction, 0.05 * fraction])
 
     return target
 

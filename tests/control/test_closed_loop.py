@@ -13,7 +13,7 @@ FREE = presets.vices().with_(friction_compensation=False)
 
 
 def test_arm_at_rest_stays(panda):
-    """Gravity is carried whole, its null-space share included."""
+    """Gravity is carried whole, its null-space fraction included."""
     for preset in (presets.vices(), presets.paper(), presets.safe()):
         plant, controller = Plant(panda), controller_at(panda, preset)
         plant.run(controller, hold(panda), 1000)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
-from tests.control.targets import harass
+from tests.control.targets import disturb
 
 from contactsafe import presets
 from contactsafe.control.codes import REJECT
-from contactsafe.control.laws import push_along
+from contactsafe.control.laws import torque_against_contact
 
 SAFE = presets.safe().with_(friction_compensation=False)
 
@@ -28,7 +28,7 @@ def commanded_push(controller, out):
     """Give what the command pushes along the contact with, N m: torque less c, g and friction."""
     now, state = controller.record["dynamics"], controller.record["state"]
     net = out.torque - now["c"] - now["g"] - state["command"]["friction"]
-    return push_along(state["isolation"]["direction"].copy(), now["M_inv"].copy(), net)
+    return torque_against_contact(state["isolation"]["direction"].copy(), now["M_inv"].copy(), net)
 
 
 def spring_torque(plant):
@@ -55,7 +55,7 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
 def test_steady_torque_of_an_obstacle_is_the_bound_in_force(panda, stiffness, off):
     """But for the angle between the contact's torque and the direction that was found for it."""
     *_, (_, controller, plant) = collision(panda, stiffness, seconds=4.0)
-    assert spring_torque(plant) == pytest.approx(float(controller.record["output"]["push_limit_nm"]), rel=off)
+    assert spring_torque(plant) == pytest.approx(float(controller.record["output"]["contact_limit_nm"]), rel=off)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
@@ -68,7 +68,7 @@ def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness
     for out, controller, _ in collision(panda, stiffness):
         if out.contact.in_contact and "rate" not in out.limited_by:
             pushes.append(commanded_push(controller, out))
-            limits.append(float(controller.record["output"]["push_limit_nm"]))
+            limits.append(float(controller.record["output"]["contact_limit_nm"]))
     assert len(pushes) > 300
     assert (np.array(pushes) <= np.array(limits) + 1e-9).all()
     assert max(pushes) > 0.99 * min(limits)
@@ -89,15 +89,15 @@ def stopped(controller, q, qd):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_bound_holds_whatever_is_asked_and_whatever_pushes(quick_panda, seed):
-    """Hostile targets, pushes anywhere, motors without limits; where no joint stop is in force."""
+    """Fuzzed targets, pushes anywhere, motors without limits; where no joint stop is in force."""
     rng, plant = np.random.default_rng(seed), Plant(quick_panda)
     controller, target, over = controller_at(quick_panda, presets.safe()), None, []
     for k in range(3000):
-        target = harass(k, 170, quick_panda, plant, rng, target)
+        target = disturb(k, 170, quick_panda, plant, rng, target)
         q, qd = plant.q, plant.qd
         out = plant.run(controller, target, 1, UNTOUCHED)
         if out.contact.in_contact and not stopped(controller, q, qd):
-            over.append(commanded_push(controller, out) - float(controller.record["output"]["push_limit_nm"]))
+            over.append(commanded_push(controller, out) - float(controller.record["output"]["contact_limit_nm"]))
     assert len(over) > 500
     assert max(over) < 1e-9
 
@@ -119,7 +119,7 @@ def test_lasting_push_is_held_against(panda, body, force):
     assert away[-1] < 0.004
 
 
-def test_bound_in_mode_reject_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
+def test_bound_in_mode_reject_is_a_multiple_of_the_torque_of_a_push_and_falls_ever_more_slowly(panda):
     """`reject_margin` times it; tried again after `reject_decay_s`, then twice, four times as long."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.push("link5", (0.0, 25.0, 0.0))
@@ -141,8 +141,8 @@ def test_bound_in_mode_reject_is_a_multiple_of_the_pushers_torque_and_falls_ever
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
-def test_there_is_no_second_blow_of_an_obstacle_that_stays(panda, stiffness):
-    """It stays in sight, and the arm leans on it gently: after the first second with less than half of the blow."""
+def test_there_is_no_second_impact_of_an_obstacle_that_stays(panda, stiffness):
+    """It stays detected, and the arm leans on it gently: after the first second with less than half of the first impact."""
     torques, commands, contacts = [], [], []
     for out, _, plant in collision(panda, stiffness, seconds=7.0):
         torques.append(spring_torque(plant))
@@ -179,7 +179,7 @@ PUSHES = [("link5", (0.0, 40.0, 0.0)), ("link4", (0.0, -40.0, 0.0))]
 
 
 @pytest.mark.parametrize(("body", "force"), PUSHES)
-def test_tool_stays_where_it_is_when_the_pusher_lets_go(panda, body, force):
+def test_tool_stays_where_it_is_when_the_push_ends(panda, body, force):
     torque, *_, away = released(panda, body, force)
     assert away < 0.005
     assert np.abs(np.diff(torque, axis=0)).max() <= 1.0

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
-from tests.control.targets import hostile_target
+from tests.control.targets import fuzzed_target
 
 from contactsafe import Measurement, Pose, Target, presets
 from contactsafe.control.impedance import passive_step
@@ -74,12 +74,12 @@ def test_no_more_power_than_the_tank_can_pay(tau, qd, moments, tank, power):
 
 
 def energy_over_tank(arm, every, seed, ticks=4000):
-    """Let a hostile policy drive; give by how much the energy given over any window exceeded tank + power × time, J."""
+    """Let a fuzzed policy drive; give by how much the energy given over any window exceeded tank + power × time, J."""
     rng, plant, controller = np.random.default_rng(seed), Plant(arm), controller_at(arm, SAFE)
     level, lowest, worst = 0.0, 0.0, 0.0
     for k in range(ticks):
         if k % every == 0:
-            target = hostile_target(arm, rng)
+            target = fuzzed_target(arm, rng)
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
         plant.step(out.torque)
@@ -102,7 +102,7 @@ def test_command_gives_no_more_energy_than_the_tank_where_motors_take_any_torque
 
 
 def swept(arm, K, ticks=4000):
-    """Lead the tool 5 cm ahead; give the greatest energy of any window, J, and the share of the speed limit reached."""
+    """Lead the tool 5 cm ahead; give the greatest energy of any window, J, and the fraction of the speed limit reached."""
     rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):

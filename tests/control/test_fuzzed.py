@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.control.plant import UNTOUCHED, Plant, controller_at
-from tests.control.targets import corner_target, harass, hostile_target
+from tests.control.targets import corner_target, disturb, fuzzed_target
 
 from contactsafe import Measurement, Target, presets
 from contactsafe.control.controller import Controller
@@ -24,7 +24,7 @@ def test_thirty_thousand_ticks_of_random_targets_and_pushes(panda):
     controller, target = controller_at(panda, SAFE), None
     before, contacts, held = panda.dynamics(panda.home, np.zeros(7))["g"], 0, 0
     for k in range(30000):
-        target = harass(k, 17, panda, plant, rng, target)
+        target = disturb(k, 17, panda, plant, rng, target)
         if k % 2000 == 0:
             wrench = None if rng.random() < 0.5 else UNTOUCHED
         out = controller.step(Measurement(plant.q, plant.qd, wrench), target)
@@ -51,9 +51,9 @@ def test_any_state_gives_a_finite_torque_within_its_limits(panda, seed):
     rng = np.random.default_rng(seed)
     records = np.zeros(1, dtype=Controller(panda, SAFE).record.dtype)
     controller = controller_at(panda, SAFE, records=records)
-    before = controller.step(Measurement(panda.home, np.zeros(7)), hostile_target(panda, rng)).torque
+    before = controller.step(Measurement(panda.home, np.zeros(7)), fuzzed_target(panda, rng)).torque
     for _ in range(60):
-        controller.set_target(hostile_target(panda, rng))
+        controller.set_target(fuzzed_target(panda, rng))
         measured = records[0]["measurement"]
         measured["q"] = rng.uniform(panda.q_min, panda.q_max) * rng.choice([1.0, 1.5])
         measured["qd"] = rng.normal(size=7) * 10.0 ** rng.uniform(-3, 3)
@@ -75,7 +75,7 @@ def test_first_measurement_at_speed_gives_a_torque_within_its_limits(panda):
     rng = np.random.default_rng(3)
     for _ in range(20):
         q, qd = rng.uniform(panda.q_min, panda.q_max), rng.uniform(-25.0, 25.0, 7)
-        out = controller_at(panda, SAFE, q).step(Measurement(q, qd, UNTOUCHED), hostile_target(panda, rng))
+        out = controller_at(panda, SAFE, q).step(Measurement(q, qd, UNTOUCHED), fuzzed_target(panda, rng))
         assert (np.abs(out.torque) <= panda.tau_max).all()
 
 

@@ -10,11 +10,11 @@ from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
     line_of_action_misses_tool,
-    push_along,
     stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
+    torque_against_contact,
 )
 from contactsafe.core.linalg import shorten
 from contactsafe.core.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
@@ -179,8 +179,8 @@ def test_acceleration_asked_of_the_tool_is_bounded_and_keeps_its_direction(seed,
     kept, asked = e.copy(), K * e
     acceleration = np.linalg.solve(Lambda, stiffness_wrench(Lambda, e, K, linear_max, angular_max))
     for part, most in ((slice(0, 3), linear_max), (slice(3, 6), angular_max)):
-        share = min(1.0, most / np.linalg.norm(asked[part]))
-        assert_allclose(acceleration[part], share * asked[part], rtol=1e-7, atol=1e-9)
+        fraction = min(1.0, most / np.linalg.norm(asked[part]))
+        assert_allclose(acceleration[part], fraction * asked[part], rtol=1e-7, atol=1e-9)
     assert_array_equal(e, kept)
 
 
@@ -199,14 +199,14 @@ def test_orientation_error_turns_the_tool_to_its_target(seed, angle):
 
 
 @given(seeds, st.floats(-40.0, 40.0))
-def test_push_along_the_contact_is_what_acts_along_it(seed, push):
+def test_torque_against_the_contact_is_what_acts_along_it(seed, push):
     """A command −push·a pushes with exactly `push`; what moves the arm across the contact counts nothing."""
     _, M_inv, residual = random_arm(seed)
     a = residual / np.linalg.norm(residual)
-    assert_allclose(push_along(a, M_inv, -push * a), push, rtol=0, atol=1e-9)
+    assert_allclose(torque_against_contact(a, M_inv, -push * a), push, rtol=0, atol=1e-9)
     across = np.random.default_rng(seed).normal(size=7)
     across -= a * (a @ M_inv @ across) / (a @ M_inv @ a)
-    assert_allclose(push_along(a, M_inv, across - push * a), push, rtol=0, atol=1e-9)
+    assert_allclose(torque_against_contact(a, M_inv, across - push * a), push, rtol=0, atol=1e-9)
 
 
 @given(seeds, st.floats(0.0, 22.0))
@@ -214,8 +214,8 @@ def test_removing_the_excess_leaves_the_bound(seed, bound):
     _, M_inv, residual = random_arm(seed)
     a = residual / np.linalg.norm(residual)
     tau = np.random.default_rng(seed).normal(size=7) * 20.0
-    push = push_along(a, M_inv, tau)
-    assert_allclose(push_along(a, M_inv, tau + (push - bound) * a), bound, rtol=0, atol=1e-9)
+    push = torque_against_contact(a, M_inv, tau)
+    assert_allclose(torque_against_contact(a, M_inv, tau + (push - bound) * a), bound, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("joint", range(7))
@@ -223,4 +223,4 @@ def test_push_is_positive_when_the_command_opposes_the_contact(panda, joint):
     """Contact pushes the joint forwards (a > 0), the command backwards."""
     M_inv = np.array(panda.dynamics(panda.home, np.zeros(7))["M_inv"])
     a = np.eye(7)[joint]
-    assert push_along(a, M_inv, -5.0 * a) == pytest.approx(5.0)
+    assert torque_against_contact(a, M_inv, -5.0 * a) == pytest.approx(5.0)

@@ -18,7 +18,7 @@ SAFE = presets.safe().with_(friction_compensation=False)
 WAY = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
 
 ANY = np.full(8, np.inf)
-"""No bound on what a link may weigh."""
+"""No bound on the mass of a link."""
 
 
 def psd(A):
@@ -108,7 +108,7 @@ def test_arm_as_modelled_is_found_to_weigh_what_its_model_says(panda):
 
 
 def test_threshold_falls_as_the_weight_becomes_known(panda):
-    """From the share of the unknown weight down to δ and little more, at rest in the posture it was found in."""
+    """From the fraction of the unknown weight down to δ and little more, at rest in the posture it was found in."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 1, UNTOUCHED)
     first = controller.record["state"]["detection"]["threshold"].copy()

@@ -19,9 +19,9 @@ VICES = presets.vices().with_(compensation_gain=50.0, residual_cutoff_hz=1e6, fr
 
 @given(st.floats(0.5, 300.0), st.floats(-20.0, 20.0))
 def test_step_is_taken_up_exponentially_exactly_at_the_ticks(gain, tau):
-    residual, share = np.zeros(1), filter_gain(gain, 0.001)
+    residual, fraction = np.zeros(1), filter_gain(gain, 0.001)
     for k in range(1, 301):
-        observer_step(residual, share, np.array([tau]))
+        observer_step(residual, fraction, np.array([tau]))
         assert_allclose(residual[0], tau * (1.0 - math.exp(-gain * 0.001 * k)), rtol=1e-9, atol=1e-12)
 
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe import presets
 from contactsafe.control.codes import COMPLY, LIMITED_BY_CONTACT, NO_CONTACT, OBSTACLE, PUSH, REJECT
 from contactsafe.control.isolation import isolation_dtype
-from contactsafe.control.laws import push_along
+from contactsafe.control.laws import torque_against_contact
 from contactsafe.control.params import fill_params, params_dtype
 from contactsafe.control.reaction import (
     begin_reaction,
@@ -56,7 +56,7 @@ def test_compensation_never_presses_harder_than_the_bound(seed, limit):
     _, M_inv, direction, compensation = scene(seed)
     before = compensation.copy()
     asked = bound_compensation(compensation, direction, M_inv, limit)
-    assert push_along(direction, M_inv, compensation) <= limit + 1e-9
+    assert torque_against_contact(direction, M_inv, compensation) <= limit + 1e-9
     if asked <= limit:
         assert_array_equal(compensation, before)
 
@@ -64,9 +64,9 @@ def test_compensation_never_presses_harder_than_the_bound(seed, limit):
 @given(seeds, limits)
 def test_excess_is_removed_exactly_and_nothing_else(seed, limit):
     _, M_inv, direction, tau = scene(seed)
-    asked = push_along(direction, M_inv, tau)
+    asked = torque_against_contact(direction, M_inv, tau)
     remove_excess(tau, direction, M_inv, limit)
-    assert_allclose(push_along(direction, M_inv, tau), min(asked, limit), rtol=1e-9, atol=1e-9)
+    assert_allclose(torque_against_contact(direction, M_inv, tau), min(asked, limit), rtol=1e-9, atol=1e-9)
 
 
 @given(seeds, st.floats(0.0, 300.0))

@@ -1,6 +1,7 @@
 """The controller for Python callers: checked at the door, then one compiled tick."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.control.checks import (
     believable,
@@ -64,7 +65,7 @@ class Controller(Independent):
 
     def __init__(
         self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
-    ):
+    ) -> None:
         if not isinstance(arm, Arm):
             raise InvalidInputError(f"arm is {type(arm).__name__}; give an Arm such as contactsafe.robots.panda()")
         config = safe() if config is None else config
@@ -92,7 +93,7 @@ class Controller(Independent):
         self._kept = _views(self._records["target"], self._index)["kept"]
         self.record["handle"] = self._nominal.handle
 
-    def reset(self, q, qd=None, torque=None) -> None:
+    def reset(self, q: ArrayLike, qd: ArrayLike | None = None, torque: ArrayLike | None = None) -> None:
         """Forget everything and hold the present pose, taking the arm over as it is: at rest, moving, or held against.
 
         The command goes on from the torque last sent, within the torque rate limit; whoever knows it says so. Else it
@@ -109,11 +110,8 @@ class Controller(Independent):
                 than the arm's limit.
         """
         q = in_range(self.arm, self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
-        qd = (
-            np.zeros(self.arm.n)
-            if qd is None
-            else believable(self.arm.joint_vector(qd, "qd"), self.record["params"]["arm"]["qd_most"])
-        )
+        qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
+        qd = believable(qd, self.record["params"]["arm"]["qd_most"])
         dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else within_limit(self.arm, torque)
         for part in ("state", "output", "measurement"):
@@ -137,7 +135,13 @@ class Controller(Independent):
         known = self.record["payload"]
         return Payload(float(known["mass"]), known["com"].copy(), known["inertia"].copy())
 
-    def set_payload(self, mass, com=None, inertia=None, in_wrench: bool | None = None) -> None:
+    def set_payload(
+        self,
+        mass: float,
+        com: ArrayLike | None = None,
+        inertia: ArrayLike | None = None,
+        in_wrench: bool | None = None,
+    ) -> None:
         """Say what the tool carries from now on, beside what the arm's model has: all of it, at rest or amid a motion.
 
         It is held until the next call, a reset included. The command follows within the torque rate; a load that the
@@ -194,7 +198,7 @@ class Controller(Independent):
             return checked_payload(0.0)
         return Payload(mass, (known.mass * known.com + found["load"][1:]) / mass, np.zeros((3, 3)))
 
-    def _last_torque(self, q: np.ndarray, dynamics) -> np.ndarray:
+    def _last_torque(self, q: np.ndarray, dynamics: np.void) -> np.ndarray:
         """Return the torque that the arm is under, as far as this controller can know, (n,), N m."""
         state = self.record["state"]
         elsewhere = np.abs(q - state["clock"]["q_good"]) > _SAME_PLACE

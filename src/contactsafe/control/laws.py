@@ -149,7 +149,7 @@ def contact_nullspace(N_t, M_inv, residual):
 
 
 @compiled
-def push_along(direction, M_inv, tau_net):
+def torque_against_contact(direction, M_inv, tau_net):
     """Return the torque with which a command acts against a contact, N m.
 
     s = −a M⁻¹ tau_net / (a M⁻¹ aᵀ): the commanded acceleration against the contact, as a torque along it.

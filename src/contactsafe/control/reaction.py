@@ -18,7 +18,7 @@ from contactsafe.control.codes import (
     REJECT,
 )
 from contactsafe.control.damping import braking_limit
-from contactsafe.control.laws import push_along
+from contactsafe.control.laws import torque_against_contact
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -141,7 +141,7 @@ def compensate_disturbance(J, J_bar, arm_torque, out):
 @inlined
 def bound_compensation(compensation, direction, M_inv, limit):
     """Scale a compensation in place so that it presses within a bound; return what it asked for, N m."""
-    asked = push_along(direction, M_inv, compensation)
+    asked = torque_against_contact(direction, M_inv, compensation)
     if asked > limit:
         for i in range(compensation.shape[0]):
             compensation[i] *= limit / asked
@@ -159,7 +159,7 @@ def scale_of_task(elastic_push, left, scale, reason):
 @inlined
 def remove_excess(tau, direction, M_inv, limit):
     """Take off a command in place what it presses along the contact beyond a bound, a (s − s_max)."""
-    excess = push_along(direction, M_inv, tau) - limit
+    excess = torque_against_contact(direction, M_inv, tau) - limit
     if excess > 0.0:
         for i in range(tau.shape[0]):
             tau[i] += excess * direction[i]

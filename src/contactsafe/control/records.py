@@ -118,8 +118,8 @@ def output_dtype(n: int) -> np.dtype:
             ("mode", _i),  # FREE, COMPLY or REJECT
             ("kind", _i),  # key of KINDS
             ("link", _i),  # 1 … n, 0 for none
-            ("push_nm", _f),  # commanded torque against the contact before the bound, N m
-            ("push_limit_nm", _f),  # the bound in force; inf where there is none
+            ("contact_command_nm", _f),  # commanded torque against the contact before it is bounded, N m
+            ("contact_limit_nm", _f),  # the bound in force; inf where there is none
             ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command
             ("bridged", _i),  # ticks in a row whose measurement was predicted
             ("target_late", _i),  # 1 where no new target came for too long

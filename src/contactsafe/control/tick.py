@@ -26,7 +26,7 @@ from contactsafe.control.impedance import (
     set_joint_damping,
     task_wrenches,
 )
-from contactsafe.control.laws import contact_nullspace, push_along, task_error, task_inertia, task_nullspace
+from contactsafe.control.laws import contact_nullspace, task_error, task_inertia, task_nullspace, torque_against_contact
 from contactsafe.control.limits import fill_tank, limit_command, limit_torque, runs_away
 from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
 from contactsafe.control.observer import observe, start_observer
@@ -171,7 +171,7 @@ def _law(c, Lambda, J_bar):
         F_spring, tool.force, params.classification.tool_contact_n, params.reaction.tool_force_limit_n
     )
     if state.mode == FREE:
-        c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
+        c.output.contact_command_nm, c.output.contact_limit_nm = 0.0, math.inf
         reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
         return react.task_scale * elastic + damping - state.link_masses.gravity_correction
     compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
@@ -197,11 +197,11 @@ def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
     reaction.damp_contact(damping, N_removed, qd, impedance.damping_scale, params)
     compensated = reaction.bound_compensation(compensation, direction, M_inv, limit)
     left = limit - max(min(compensated, limit), 0.0)
-    asked = push_along(direction, M_inv, elastic)
+    asked = torque_against_contact(direction, M_inv, elastic)
     scale, reason = reaction.scale_of_task(asked, left, scale, reason)
     reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
     tau = react.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
-    c.output.push_nm, c.output.push_limit_nm = compensated + asked, limit
+    c.output.contact_command_nm, c.output.contact_limit_nm = compensated + asked, limit
     reaction.remove_excess(tau, direction, M_inv, limit)
     if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
