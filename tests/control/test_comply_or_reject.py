@@ -142,7 +142,7 @@ def test_bound_in_mode_reject_is_a_multiple_of_the_torque_of_a_push_and_falls_ev
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
 def test_there_is_no_second_impact_of_an_obstacle_that_stays(panda, stiffness):
-    """It stays detected, and the arm leans on it gently: after the first second with less than half of the first impact."""
+    """It stays detected, and the arm leans on it gently: after a second with less than half of the first impact."""
     torques, commands, contacts = [], [], []
     for out, _, plant in collision(panda, stiffness, seconds=7.0):
         torques.append(spring_torque(plant))

@@ -102,7 +102,7 @@ def test_command_gives_no_more_energy_than_the_tank_where_motors_take_any_torque
 
 
 def swept(arm, K, ticks=4000):
-    """Lead the tool 5 cm ahead; give the greatest energy of any window, J, and the fraction of the speed limit reached."""
+    """Lead the tool by 5 cm; return the greatest energy of any window, J, and the fraction of the speed limit."""
     rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):
