@@ -589,7 +589,11 @@ def pull_and_energy() -> None:
     pulls = [
         np.linalg.norm(
             stiffness_wrench(
-                m.Lambda, error, np.full(6, 1500.0), c.task_acceleration_max_m_s2, c.task_acceleration_max_rad_s2
+                m.Lambda,
+                error,
+                np.full(6, 1500.0),
+                c.impedance.task_acceleration_max_m_s2,
+                c.impedance.task_acceleration_max_rad_s2,
             )[:3]
         )
         for c in (PAPER, SAFE)

@@ -127,10 +127,10 @@ def test_a_snapshot_of_something_else_is_refused(course):
         ("plants", "push_body", 10**9),
         ("plants", "camera", -1),
         ("plants", "tcp_site", 10**9),
-        ("controllers", "state.search_at", 10**9),
+        ("controllers", "state.isolation.search_at", 10**9),
         ("controllers", "state.turn", 7),
         ("controllers", "handle.surface_points", 10**9),
-        ("controllers", "state.tau", np.nan),
+        ("controllers", "state.command.tau", np.nan),
     ],
 )
 def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, part, field, value):

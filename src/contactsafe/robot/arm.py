@@ -108,7 +108,7 @@ class Arm(Independent):
 
         Args:
             model: of the scene.
-            tick_s: the controller's tick, `ControllerConfig.dt`, s.
+            tick_s: the controller's tick, `ControllerConfig.clock.dt`, s.
 
         Raises:
             InvalidInputError: a joint is missing, has not exactly one motor, or the timestep does not divide the tick.
