@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from contactsafe import presets
+from contactsafe.control.codes import COMPLY, REJECT
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import LINKS, sample_motion
 from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
@@ -119,8 +120,7 @@ def test_metrics_are_what_they_say():
     rows["obstacle_force"][800:] = 10.0
     rows["tau_arm"][150, 3] = -7.0
     rows["link"][112:] = 5
-    rows["mode"][112:312] = 1
-    rows["holding"][212:312] = 1
+    rows["mode"][112:212], rows["mode"][212:312] = COMPLY, REJECT
     rows["position"][:, 0] = np.linspace(0.0, 0.03, 1000)
     rows["q"][300:400, 3] = arm.q_max[3]
     found = collision_metrics(rows, free, arm)
