@@ -10,6 +10,7 @@ import numpy as np
 
 from contactsafe.control.codes import COMPLY, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
 from contactsafe.control.laws import observer_step
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
@@ -35,14 +36,14 @@ def classification_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def follow_velocity(classification, qd, step):
+def follow_velocity(classification: Record, qd: Vector, step: Record) -> None:
     """Filter the joint velocity as the torque is, or the torque's lag would look like a push."""
     observer_step(classification.velocity_unfiltered, step.detection_filter_gain, qd)
     observer_step(classification.velocity, step.lowpass_gain, classification.velocity_unfiltered)
 
 
 @compiled
-def begin_classification(classification):
+def begin_classification(classification: Record) -> None:
     """Begin with a contact of which nothing is known."""
     classification.displacement_rad, classification.displacement_smooth_rad = 0.0, 0.0
     classification.torque_smooth_nm, classification.reference_nm = 0.0, 0.0
@@ -50,7 +51,9 @@ def begin_classification(classification):
 
 
 @inlined
-def classify(classification, direction, lever, torque, mode, step, params):
+def classify(
+    classification: Record, direction: Vector, lever: float, torque: Vector, mode: int, step: Record, params: Record
+) -> int:
     """Return what the contact has shown itself to be in this tick: OBSTACLE, PUSH, or NO_CONTACT for nothing new.
 
     Args:
@@ -80,7 +83,7 @@ def classify(classification, direction, lever, torque, mode, step, params):
 
 
 @inlined
-def _follow_contact(classification, direction, torque, step):
+def _follow_contact(classification: Record, direction: Vector, torque: Vector, step: Record) -> None:
     """Follow how far the arm has receded along the contact, and the contact's torque meanwhile."""
     classification.displacement_rad += step.dt * dot(direction, classification.velocity)
     along = dot(direction, torque)
@@ -90,7 +93,7 @@ def _follow_contact(classification, direction, torque, step):
 
 
 @compiled
-def is_push(drop, displacement, lever, stiffness):
+def is_push(drop: float, displacement: float, lever: float, stiffness: float) -> bool:
     """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
     The torque of a spring of k N/m at a lever arm of l falls by k l² for every radian that the arm recedes; a push goes
@@ -106,7 +109,7 @@ def is_push(drop, displacement, lever, stiffness):
 
 
 @compiled
-def contact_kind(mode, tool_force, tool_contact_n):
+def contact_kind(mode: int, tool_force: Vector, tool_contact_n: float) -> int:
     """Return what touches the arm or its tool: a key of `KINDS`. A contact of the arm comes before one of the tool."""
     if mode == COMPLY:
         return OBSTACLE

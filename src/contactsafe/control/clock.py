@@ -23,6 +23,7 @@ from contactsafe.control.plausibility import (
     velocity_jumps,
 )
 from contactsafe.control.prediction import predict
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 
 _f = np.float64
@@ -61,7 +62,7 @@ def clock_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def receive(c, usable):
+def receive(c: Record, usable: bool) -> None:
     """Take the measurement over, or predict what it should have been; count the ticks that passed.
 
     Args:
@@ -77,8 +78,7 @@ def receive(c, usable):
         _accept(c, since, timed)
     else:
         predict(c, usual * c.params.clock.dt)
-        clock.elapsed = usual
-        clock.since += usual
+        clock.elapsed, clock.since = usual, clock.since + usual
         clock.bridged += 1
     overdue = reason == 0 and since > OVERDUE_TICKS
     resting = reason == REPEATED and since > 0.0 and not should_have_moved(state.arm, clock)
@@ -90,7 +90,7 @@ def receive(c, usable):
 
 
 @compiled
-def _judge(c, ticks):
+def _judge(c: Record, ticks: float) -> tuple[int, float, bool]:
     """Tell what is wrong with the measurement, how many ticks passed since the last good one, whether a clock says so.
 
     Nothing is wrong: 0. No tick passed where it is the last one again by its time as well.
@@ -127,14 +127,14 @@ def _judge(c, ticks):
 
 
 @compiled
-def _ticks_told(c):
+def _ticks_told(c: Record) -> float:
     """Ticks since the last good measurement by its time and that of this one."""
     clock = c.state.clock
     return (c.measurement.time - clock.time) / c.params.clock.dt - clock.offset
 
 
 @compiled
-def _is_believed(state, told):
+def _is_believed(state: Record, told: float) -> bool:
     """Tell whether a clock is believed by which so many ticks passed; latch the fault of one that did not go on.
 
     Such a one is not believed either, until reset, where it is far beyond: that is no reason to brake.
@@ -148,7 +148,7 @@ def _is_believed(state, told):
 
 
 @compiled
-def _accept(c, since, timed):
+def _accept(c: Record, since: float, timed: bool) -> None:
     """Take the measurement over; `timed` where its clock told how many ticks passed.
 
     A clock that stands or stutters is counted on, one that was set anew goes on from there.
@@ -176,7 +176,7 @@ def _accept(c, since, timed):
 
 
 @compiled
-def set_step(step, one_tick, ticks):
+def set_step(step: Record, one_tick: Record, ticks: float) -> None:
     """Resolve what gains and rates come to over so many ticks.
 
     Args:
@@ -196,6 +196,6 @@ def set_step(step, one_tick, ticks):
 
 
 @compiled
-def _over(gain, ticks):
+def _over(gain: float, ticks: float) -> float:
     """Return the fraction of a step that a first-order filter takes up in so many ticks, from that of one."""
     return gain if ticks == 1.0 else 1.0 - (1.0 - gain) ** ticks

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.friction import joint_friction_into
@@ -27,7 +28,15 @@ def detection_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def set_thresholds(detection, observer, gravity_sigma, qd, CT_qd, params, friction_coefficients):
+def set_thresholds(
+    detection: Record,
+    observer: Record,
+    gravity_sigma: Vector,
+    qd: Vector,
+    CT_qd: Vector,
+    params: Record,
+    friction_coefficients: Matrix,
+) -> None:
     """Set each joint's threshold to what is not known of the arm.
 
     δ plus a fraction of friction and of inertial torque, whose model is not exact, plus what a late command is short
@@ -52,7 +61,7 @@ def set_thresholds(detection, observer, gravity_sigma, qd, CT_qd, params, fricti
 
 
 @inlined
-def detect(detection, in_contact, ticks, params):
+def detect(detection: Record, in_contact: bool, ticks: int, params: Record) -> tuple[int, bool]:
     """Return the furthest link whose joint exceeds its threshold, and whether the arm is in contact from now on.
 
     Contact begins above the threshold; it ends after the dwell, once all joints have stayed below a fraction of it.
@@ -77,7 +86,7 @@ def detect(detection, in_contact, ticks, params):
 
 
 @compiled
-def _furthest_above(residual, threshold, fraction):
+def _furthest_above(residual: Vector, threshold: Vector, fraction: float) -> int:
     """Return the furthest joint from the base whose residual exceeds a fraction of its threshold, 1 … n; 0 for none."""
     for i in range(residual.shape[0] - 1, -1, -1):
         if abs(residual[i]) > fraction * threshold[i]:

@@ -13,6 +13,7 @@ from contactsafe.control.damping import (
     task_damping_into,
 )
 from contactsafe.control.laws import damping_wrench, stiffness_wrench
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into, shorten
 from contactsafe.core.stack import stack_vector
@@ -35,7 +36,9 @@ def impedance_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
+def passive_step(
+    K: Vector, D: Vector, K_wanted: Vector, D_wanted: Vector, dt: float, damping_min: float, limited: bool
+) -> None:
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
     Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016, eq. 12), each axis by
@@ -57,7 +60,7 @@ def passive_step(K, D, K_wanted, D_wanted, dt, damping_min, limited):
 
 
 @inlined
-def follow_gains(impedance, target, dt, params):
+def follow_gains(impedance: Record, target: Record, dt: float, params: Record) -> None:
     """Move the gains in force towards those of the target."""
     passive_step(
         impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.damping_range[0],
@@ -66,7 +69,9 @@ def follow_gains(impedance, target, dt, params):
 
 
 @inlined
-def task_wrenches(impedance, Lambda, error, dynamics, delay_s, params):
+def task_wrenches(
+    impedance: Record, Lambda: Matrix, error: Vector, dynamics: Record, delay_s: float, params: Record
+) -> tuple[Vector, Vector]:
     """Return elastic and damping wrench at the tool, (4), (6,) each, N and N m; and note the largest damping.
 
     Args:
@@ -86,7 +91,7 @@ def task_wrenches(impedance, Lambda, error, dynamics, delay_s, params):
 
 
 @inlined
-def set_joint_damping(impedance, mode, M_inv, params):
+def set_joint_damping(impedance: Record, mode: int, M_inv: Matrix, params: Record) -> None:
     """Set the part of each joint's damping that its inertia takes beside the damping of the task.
 
     Args:
@@ -110,7 +115,9 @@ def set_joint_damping(impedance, mode, M_inv, params):
 
 
 @inlined
-def posture_torques_into(impedance, arm, q_posture, scale, params, elastic, damping):
+def posture_torques_into(
+    impedance: Record, arm: Record, q_posture: Vector, scale: float, params: Record, elastic: Vector, damping: Vector
+) -> None:
     """Fill elastic and damping torque of the posture task, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m.
 
     Args:
@@ -132,7 +139,7 @@ def posture_torques_into(impedance, arm, q_posture, scale, params, elastic, damp
 
 
 @inlined
-def compose_into(J, wrench, N, posture, out):
+def compose_into(J: Matrix, wrench: Vector, N: Matrix, posture: Vector, out: Vector) -> Vector:
     """Fill Jᵀ F + Nᵀ Γ, (n,), N m: a task, and a posture in a null space of it."""
     n = out.shape[0]
     of_task, of_posture = stack_vector(n), stack_vector(n)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.contact_geometry import best_point, contact_lever, surface_torque
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
@@ -37,7 +38,7 @@ def isolation_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def isolate(isolation, handle, link, torque):
+def isolate(isolation: Record, handle: Record, link: int, torque: Vector) -> None:
     """Take the direction from the contact's torque, and look for its place on the surface.
 
     All of the surface is searched when a contact is found, later a part each tick. Lever arms are smoothed: a contact
@@ -69,18 +70,18 @@ def isolate(isolation, handle, link, torque):
 
 
 @compiled
-def forget_contact(isolation):
+def forget_contact(isolation: Record) -> None:
     """Begin the next search anew."""
     isolation.link, isolation.search_at = 0, 0
 
 
 @compiled
-def _size(x):
+def _size(x: Vector) -> float:
     return max(math.sqrt(dot(x, x)), 1e-9)
 
 
 @compiled
-def _longest_lever(handle, link, direction):
+def _longest_lever(handle: Record, link: int, direction: Vector) -> float:
     """Return the longest lever arm of the links that may be touched: near its joint a link shows less."""
     lever = 0.0
     for further in range(link, direction.shape[0] + 1):
@@ -89,7 +90,7 @@ def _longest_lever(handle, link, direction):
 
 
 @compiled
-def _take_link(isolation, handle, link, lever, gain):
+def _take_link(isolation: Record, handle: Record, link: int, lever: float, gain: float) -> None:
     lever_max = max(lever, contact_lever(handle, link, isolation.direction))
     isolation.link = link
     isolation.lever += gain * (max(lever, _LEAST_LEVER) - isolation.lever)

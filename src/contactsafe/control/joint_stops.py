@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.damping import joint_damping_limits
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into, spd_inverse
 from contactsafe.core.stack import stack_matrix, stack_vector
@@ -34,7 +35,9 @@ def stops_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def predict_velocity(stops, qd, M_inv, momentum_rate, step_max, dt):
+def predict_velocity(
+    stops: Record, qd: Vector, M_inv: Matrix, momentum_rate: Vector, step_max: float, dt: float
+) -> None:
     """Fill the speed that joints will have before the torque that drives them can be taken off, and the horizon.
 
     A command falls by `step_max` a tick at most: until it is gone it goes on accelerating, by half of it on average.
@@ -58,7 +61,7 @@ def predict_velocity(stops, qd, M_inv, momentum_rate, step_max, dt):
 
 
 @inlined
-def joint_excess(stops, q, qd, arm, margin, deceleration):
+def joint_excess(stops: Record, q: Vector, qd: Vector, arm: Record, margin: float, deceleration: float) -> bool:
     """Fill by how much each joint is too fast and too far, signed by its direction; tell whether any is.
 
     A joint may move no faster than it can be stopped before a margin of its range, √(2 a d), nor than its speed limit;
@@ -86,7 +89,9 @@ def joint_excess(stops, q, qd, arm, margin, deceleration):
 
 
 @compiled
-def joint_stop_gains(stops, M, damping, rate, gain, stiffness, delay_s):
+def joint_stop_gains(
+    stops: Record, M: Matrix, damping: Vector, rate: float, gain: float, stiffness: float, delay_s: float
+) -> None:
     """Fill what the joint stops may brake and push back with, kept within what those joints take (`control.damping`).
 
     The brake is in proportion to the inertia that the joint moves; the spring no more than lets damping make up twice
@@ -122,7 +127,7 @@ def joint_stop_gains(stops, M, damping, rate, gain, stiffness, delay_s):
 
 
 @compiled
-def joint_stop_torque(stops, tau_net, M_inv, qd, margin):
+def joint_stop_torque(stops: Record, tau_net: Vector, M_inv: Matrix, qd: Vector, margin: float) -> None:
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
     What is too fast is braked, and what drives it on fades; within the margin a spring pushes back, damped on the way

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t_into, shorten, spd_inverse
 from contactsafe.core.rotation import orientation_error
@@ -15,7 +16,7 @@ from contactsafe.core.stack import stack_matrix, stack_vector
 
 
 @compiled
-def task_inertia(J, M_inv, manipulability_floor, damping_max):
+def task_inertia(J: Matrix, M_inv: Matrix, manipulability_floor: float, damping_max: float) -> tuple[Matrix, Matrix]:
     """Return Λ = (J M⁻¹ Jᵀ)⁻¹, damped where the arm loses a direction.
 
     Below a floor of manipulability w = det(J M⁻¹ Jᵀ) a term λ² I is added before inverting, growing smoothly from zero
@@ -43,7 +44,7 @@ def task_inertia(J, M_inv, manipulability_floor, damping_max):
 
 
 @compiled
-def _determinant(A):
+def _determinant(A: Matrix) -> float:
     """Determinant of a symmetric positive semi-definite matrix, by Cholesky's pivots; 0 where one is not positive."""
     n = A.shape[0]
     L = stack_matrix(n, n)
@@ -62,7 +63,7 @@ def _determinant(A):
 
 
 @compiled
-def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
+def stiffness_wrench(Lambda: Matrix, error: Vector, K_task: Vector, linear_max: float, angular_max: float) -> Vector:
     """Return the task stiffness force, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
 
     Args:
@@ -81,7 +82,7 @@ def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
 
 
 @compiled
-def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
+def damping_wrench(Lambda: Matrix, velocity: Vector, Jdot_qd: Vector, D_task: Vector) -> Vector:
     """Return the damping force of the task, −Λ (D ẋ + J̇ q̇) of (4), (6,), N and N m.
 
     Args:
@@ -97,7 +98,7 @@ def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
 
 
 @compiled
-def task_error(position_d, quat_d, position, rotation):
+def task_error(position_d: Vector, quat_d: Vector, position: Vector, rotation: Matrix) -> Vector:
     """Return x_d − x: position difference, then rotation vector of R_d Rᵀ, world axes, (6,), m and rad."""
     error = np.empty(6)
     rotvec = orientation_error(quat_d, rotation)
@@ -108,7 +109,7 @@ def task_error(position_d, quat_d, position, rotation):
 
 
 @compiled
-def task_nullspace(J, J_bar):
+def task_nullspace(J: Matrix, J_bar: Matrix) -> Matrix:
     """Return N_t = I − J# J, (16), (n, n); J_bar is the dynamically consistent inverse M⁻¹ Jᵀ Λ, (n, 6)."""
     N = matmul(J_bar, J)
     for i in range(N.shape[0]):
@@ -119,8 +120,8 @@ def task_nullspace(J, J_bar):
 
 
 @compiled
-def contact_nullspace(N_t, M_inv, residual):
-    """Remove the contact direction from the task null space.
+def contact_nullspace(N_t: Matrix, M_inv: Matrix, residual: Vector) -> Matrix:
+    """Remove the contact direction from the task null space; return the projector, (n, n).
 
     N_ct = N_t (I − a# a) with a = residualᵀ N_t and a# = M⁻¹ aᵀ / (a M⁻¹ aᵀ), (21). The printed law is 0/0 where the
     contact lies wholly in task directions; there N_ct = N_t.
@@ -129,9 +130,6 @@ def contact_nullspace(N_t, M_inv, residual):
         N_t: task null-space projector, (n, n).
         M_inv: inverse joint inertia, (n, n), 1/(kg m²).
         residual: contact torque on the arm, (n,), N m.
-
-    Returns:
-        Projector, (n, n).
     """
     n = N_t.shape[0]
     a = matvec_t_into(N_t, residual, stack_vector(n))
@@ -149,7 +147,7 @@ def contact_nullspace(N_t, M_inv, residual):
 
 
 @compiled
-def torque_against_contact(direction, M_inv, tau_net):
+def torque_against_contact(direction: Vector, M_inv: Matrix, tau_net: Vector) -> float:
     """Return the torque with which a command acts against a contact, N m.
 
     s = −a M⁻¹ tau_net / (a M⁻¹ aᵀ): the commanded acceleration against the contact, as a torque along it.
@@ -164,19 +162,19 @@ def torque_against_contact(direction, M_inv, tau_net):
 
 
 @compiled
-def momentum_into(M, qd, out):
+def momentum_into(M: Matrix, qd: Vector, out: Vector) -> Vector:
     """Fill p = M q̇, (10), (n,), kg m²/s, and give it back."""
     return matvec_into(M, qd, out)
 
 
 @compiled
-def filter_gain(gain, dt):
+def filter_gain(gain: float, dt: float) -> float:
     """Return 1 − exp(−K dt), the fraction of a step that a first-order filter of gain K (1/s) takes up in a tick."""
     return 1.0 - math.exp(-gain * dt)
 
 
 @compiled
-def observer_step(residual, gain, tau_external):
+def observer_step(residual: Vector, gain: float, tau_external: Vector) -> None:
     """Advance the momentum observer in place by one tick, (12)-(14).
 
     r ← r + (1 − exp(−K dt)) (tau_external − r), where tau_external = Δp/dt − (tau_m + Jᵀ w − β) is the raw external
@@ -193,7 +191,9 @@ def observer_step(residual, gain, tau_external):
 
 
 @compiled
-def identify_masses(mass_error, covariance, row, torque, variance, largest):
+def identify_masses(
+    mass_error: Vector, covariance: Matrix, row: Vector, torque: float, variance: float, largest: Vector
+) -> None:
     """Identify in place the masses of the links from one joint's gravity torque: one step of a Kalman filter.
 
     A mass that no link can have is not believed: a push too faint to be noticed would otherwise be taken for weight.
@@ -215,7 +215,7 @@ def identify_masses(mass_error, covariance, row, torque, variance, largest):
 
 
 @compiled
-def line_of_action_misses_tool(wrench, radius, margin):
+def line_of_action_misses_tool(wrench: Vector, radius: float, margin: float) -> bool:
     """Tell whether a wrench at the tool point cannot come from a contact of the tool: its line of action misses it.
 
     Args:

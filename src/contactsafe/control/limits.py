@@ -14,6 +14,7 @@ from contactsafe.control.joint_stops import (
     stops_dtype,
 )
 from contactsafe.control.plausibility import all_usable
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
@@ -45,7 +46,7 @@ def limits_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def limit_command(c, tau):
+def limit_command(c: Record, tau: Vector) -> tuple[int, bool]:
     """Keep a command within all limits, in place; return what took something off it, a sum of keys of LIMITS.
 
     Joints are stopped from what the motors can do, not from what is wanted of them: torque is limited first, and last
@@ -88,7 +89,7 @@ def limit_command(c, tau):
 
 
 @inlined
-def replace_unusable(tau, tau_previous):
+def replace_unusable(tau: Vector, tau_previous: Vector) -> bool:
     """Repeat the last command in place where a law gave none that is finite; tell whether it was finite."""
     if all_usable(tau):
         return True
@@ -97,14 +98,14 @@ def replace_unusable(tau, tau_previous):
 
 
 @inlined
-def fill_tank(limits, command, g, qd, dt, params):
+def fill_tank(limits: Record, command: Record, g: Vector, qd: Vector, dt: float, params: Record) -> None:
     """Take what the command gives the arm out of the tank, and add the steady power."""
     given = dot(command.tau - command.friction - g, qd)
     limits.tank_j = min(limits.tank_j + dt * (params.tank_power_w - given), params.tank_j)
 
 
 @inlined
-def runs_away(limits, qd, M, dt, arm):
+def runs_away(limits: Record, qd: Vector, M: Matrix, dt: float, arm: Record) -> bool:
     """Tell whether a joint stays beyond its speed limit for longer than braking it takes.
 
     Args:
@@ -126,7 +127,9 @@ def runs_away(limits, qd, M, dt, arm):
 
 
 @inlined
-def _stop_joints(stops, arm, impedance, dynamics, params, tau_net):
+def _stop_joints(
+    stops: Record, arm: Record, impedance: Record, dynamics: Record, params: Record, tau_net: Vector
+) -> bool:
     """Keep joints in their range and below their speed limits, in place; tell whether that took anything."""
     known = params.limits
     if not joint_excess(stops, arm.q, arm.qd, params.arm, known.joint_margin, known.joint_deceleration):
@@ -141,7 +144,7 @@ def _stop_joints(stops, arm, impedance, dynamics, params, tau_net):
 
 
 @inlined
-def _slow_down(limits, qd, dynamics, params, tau):
+def _slow_down(limits: Record, qd: Vector, dynamics: Record, params: Record, tau: Vector) -> bool:
     """Brake the whole arm in place of the command as far as it is too fast; tell whether that took anything.
 
     Where it has run away nothing but that is left to do.
@@ -159,8 +162,8 @@ def _slow_down(limits, qd, dynamics, params, tau):
 
 
 @compiled
-def power_limit(tau, M, qd, tank, power, drain_s):
-    """Damp a command in place so that it gives the arm no more power than a tank of energy can pay.
+def power_limit(tau: Vector, M: Matrix, qd: Vector, tank: float, power: float, drain_s: float) -> bool:
+    """Damp a command in place to give the arm no more power than a tank of energy can pay; tell whether it had to.
 
     The tank is filled with a steady power and by what the command takes out of the arm. Its level falls no faster than
     level/drain_s beyond that power; what is taken off brakes all joints alike, along M q̇: it turns no light joint back.
@@ -172,9 +175,6 @@ def power_limit(tau, M, qd, tank, power, drain_s):
         tank: level, J.
         power: steady, W.
         drain_s: s.
-
-    Returns:
-        True where anything was taken off.
     """
     allowed = power + max(tank, 0.0) / drain_s
     given = dot(tau, qd)
@@ -190,7 +190,7 @@ def power_limit(tau, M, qd, tank, power, drain_s):
 
 
 @compiled
-def limit_torque(tau, tau_previous, tau_max, step_max, M_inv):
+def limit_torque(tau: Vector, tau_previous: Vector, tau_max: Vector, step_max: float, M_inv: Matrix) -> bool:
     """Keep a command within the torque limits and a largest change per tick, in place, and as near to what was asked.
 
     A joint whose torque is clipped accelerates otherwise than it was asked to, and drags along all that is coupled to
@@ -218,14 +218,14 @@ def limit_torque(tau, tau_previous, tau_max, step_max, M_inv):
 
 
 @compiled
-def _bounds(tau_previous, tau_max, step_max):
+def _bounds(tau_previous: float, tau_max: float, step_max: float) -> tuple[float, float]:
     """Return what a torque may be: within the limit, even where the last one was beyond it."""
     low = min(max(tau_previous - step_max, -tau_max), tau_max)
     return low, max(min(tau_previous + step_max, tau_max), -tau_max)
 
 
 @compiled
-def _constrain_least(tau, tau_previous, tau_max, step_max, M_inv):
+def _constrain_least(tau: Vector, tau_previous: Vector, tau_max: Vector, step_max: float, M_inv: Matrix) -> None:
     """Clip a command in place, and let each joint in turn make up for it; no such step makes it worse."""
     n = tau.shape[0]
     low, high, change = stack_vector(n), stack_vector(n), stack_vector(n)

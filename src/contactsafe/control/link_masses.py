@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from contactsafe.control.laws import identify_masses
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
@@ -42,7 +43,7 @@ def link_masses_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def start_link_masses(masses, regressor, variance):
+def start_link_masses(masses: Record, regressor: Matrix, variance: Vector) -> None:
     """Begin with the masses of the model, as uncertain as is said."""
     reset_link_masses(masses, variance)
     for i in range(masses.gravity_sigma.shape[0]):
@@ -50,7 +51,7 @@ def start_link_masses(masses, regressor, variance):
 
 
 @compiled
-def reset_link_masses(masses, variance):
+def reset_link_masses(masses: Record, variance: Vector) -> None:
     """Forget what was identified."""
     masses.mass_error[:] = 0.0
     masses.covariance[:] = 0.0
@@ -59,7 +60,7 @@ def reset_link_masses(masses, variance):
 
 
 @inlined
-def correct_gravity(masses, dynamics, handle, has_wrench, variance):
+def correct_gravity(masses: Record, dynamics: Record, handle: Record, has_wrench: int, variance: Vector) -> None:
     """Add what the links were found to be heavier than the model says to the model's gravity torque.
 
     That is for the observer and the bounds. The command does without, see `gravity_correction`: in free motion the arm
@@ -83,7 +84,16 @@ def correct_gravity(masses, dynamics, handle, has_wrench, variance):
 
 
 @inlined
-def identify_link_masses(masses, i, residual, model_uncertainty, row, dt, untouched, variance):
+def identify_link_masses(
+    masses: Record,
+    i: int,
+    residual: float,
+    model_uncertainty: float,
+    row: Vector,
+    dt: float,
+    untouched: bool,
+    variance: Vector,
+) -> None:
     """Identify the links' masses from joint i's residual, where nothing touches the arm and a sensor shows the tool.
 
     Without a force sensor nothing is identified, and with one the tool's weight does not show: what is not known of
@@ -113,7 +123,7 @@ def identify_link_masses(masses, i, residual, model_uncertainty, row, dt, untouc
 
 
 @compiled
-def _gravity_sigma(covariance, row):
+def _gravity_sigma(covariance: Matrix, row: Vector) -> float:
     """Return the standard deviation of what a joint's gravity torque differs from the model's, N m."""
     P_row = matvec_into(covariance, row, stack_vector(row.shape[0]))
     return math.sqrt(max(dot(row, P_row), 0.0))

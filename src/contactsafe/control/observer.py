@@ -4,6 +4,7 @@ import numpy as np
 
 from contactsafe.control.laws import momentum_into, observer_step
 from contactsafe.control.plausibility import BRIDGE_TICKS
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -39,7 +40,7 @@ def observer_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def start_observer(observer, command, dynamics, qd):
+def start_observer(observer: Record, command: Record, dynamics: Record, qd: Vector) -> None:
     """Begin with the momentum of now, and a raw external torque of zero.
 
     What the torque last sent did is not known: all of it that the arm did not need is put down to friction this once.
@@ -52,7 +53,9 @@ def start_observer(observer, command, dynamics, qd):
 
 
 @inlined
-def observe(observer, arm, clock, step, command, dynamics, params):
+def observe(
+    observer: Record, arm: Record, clock: Record, step: Record, command: Record, dynamics: Record, params: Record
+) -> None:
     """Raw external torque since the last good measurement, two observers of it, a low-pass behind each.
 
     It is a mean over the time that passed, in which what was commanded is known tick by tick.
@@ -93,7 +96,7 @@ def observe(observer, arm, clock, step, command, dynamics, params):
 
 
 @inlined
-def _add_impulse(observer, elapsed, command, dynamics):
+def _add_impulse(observer: Record, elapsed: float, command: Record, dynamics: Record) -> None:
     """Add what the command did in the ticks that passed, less friction and β, the mean of then and now."""
     observer.impulse_ticks += elapsed
     for i in range(observer.beta.shape[0]):
@@ -104,7 +107,7 @@ def _add_impulse(observer, elapsed, command, dynamics):
 
 
 @compiled
-def _tool_torque_into(observer, wrench, J, since, step, out):
+def _tool_torque_into(observer: Record, wrench: Vector, J: Matrix, since: float, step: Record, out: Vector) -> None:
     """Fill the measured tool wrench as joint torque, (n,), N m: of the last tick, and of those before it by its mean.
 
     What the tool felt in a gap nobody knows; it may be all that it felt of late. That is `tool_torque_unseen`, and dies

@@ -2,6 +2,7 @@
 
 from contactsafe.control.plausibility import BRIDGE_TICKS, OVERDUE_TICKS, SLACK_RAD, furthest_astray
 from contactsafe.control.prediction import net_torque
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
@@ -17,7 +18,7 @@ _SHAKES = 0.25
 
 
 @compiled
-def ticks_from_motion(c, ticks):
+def ticks_from_motion(c: Record, ticks: float) -> float:
     """Find how many ticks passed, where no clock says it, from how far the joints went; 0 where that explains nothing.
 
     The least-squares N of Δq = N dt q̇ over all joints. It must leave every joint where its velocities allow, but for a
@@ -44,7 +45,7 @@ def ticks_from_motion(c, ticks):
 
 
 @compiled
-def learn_pace(c):
+def learn_pace(c: Record) -> None:
     """Learn how many ticks of time a call comes to where no clock says it, from how far the joints go: Kalman's filter.
 
     A moving arm tells it precisely, one at rest not at all, and one whose velocity changes as much as it moves little:

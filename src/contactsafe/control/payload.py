@@ -10,6 +10,7 @@ import numpy as np
 
 from contactsafe.control.laws import identify_masses
 from contactsafe.control.link_masses import CORRELATED, NOISE_NM
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross_into, dot, matvec_into, matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -78,7 +79,7 @@ payload_dtype = np.dtype(
 
 
 @compiled
-def take_off_payload(c):
+def take_off_payload(c: Record) -> None:
     """Take the known payload's weight and inertial force off a measured wrench that has them in it.
 
     The wrench of the environment is what the sensor shows less (m γ − ṗ, r × m γ − L̇ − v × p), with the payload's
@@ -102,7 +103,7 @@ def take_off_payload(c):
 
 
 @compiled
-def payload_weight_into(load, rotation, gravity, out):
+def payload_weight_into(load: Record, rotation: Matrix, gravity: Vector, out: Vector) -> Vector:
     """Fill the weight of what the tool carries as a wrench at the tool point, world axes, (6,), N and N m."""
     r = matvec_into(rotation, load.com, stack_vector(3))
     for k in range(3):
@@ -112,7 +113,7 @@ def payload_weight_into(load, rotation, gravity, out):
 
 
 @compiled
-def payload_momentum_into(load, dynamics, out):
+def payload_momentum_into(load: Record, dynamics: Record, out: Vector) -> Vector:
     """Fill the momentum of what the tool carries, and that about the tool point, world axes, (6,)."""
     R, v, omega = dynamics.rotation, dynamics.velocity[:3], dynamics.velocity[3:]
     r = matvec_into(R, load.com, stack_vector(3))
@@ -126,7 +127,7 @@ def payload_momentum_into(load, dynamics, out):
 
 
 @compiled
-def reset_payload(payload):
+def reset_payload(payload: Record) -> None:
     """Begin anew to identify what the tool carries beyond what is known."""
     payload.load[:] = 0.0
     payload.covariance[:] = 0.0
@@ -137,12 +138,12 @@ def reset_payload(payload):
 
 
 @compiled
-def _prior(k):
+def _prior(k: int) -> float:
     return _MASS_SIGMA_KG**2 if k == 0 else _MOMENT_SIGMA_KG_M**2
 
 
 @compiled
-def load_regressor_into(c, i, row):
+def load_regressor_into(c: Record, i: int, row: Vector) -> Vector:
     """Fill the gravity torque at joint i of a load per its mass and mass times centre, (4,), m² / s² and m / s²."""
     J, R, gravity = c.dynamics.J, c.dynamics.rotation, c.handle.gravity
     axis, arm = stack_vector(3), stack_vector(3)
@@ -156,7 +157,7 @@ def load_regressor_into(c, i, row):
 
 
 @compiled
-def identify_payload(c):
+def identify_payload(c: Record) -> bool:
     """Identify what the tool carries beyond the model from one joint's torque, while the arm is slow; one joint a tick.
 
     The torque is all that acts from outside, also on the tool: the sum of what the sensor shows and the observer finds.
@@ -179,7 +180,7 @@ def identify_payload(c):
 
 
 @compiled
-def _external_torque(c, i):
+def _external_torque(c: Record, i: int) -> float:
     """Return what acts on joint i from outside, N m, gravity that was identified included."""
     state = c.state
     torque = state.observer.residual[i] - state.link_masses.gravity_correction[i]
@@ -189,7 +190,7 @@ def _external_torque(c, i):
 
 
 @compiled
-def _identify_load(payload, row, torque, error, dt):
+def _identify_load(payload: Record, row: Vector, torque: float, error: float, dt: float) -> None:
     """Take one joint's torque into the estimate of the load, and into what tells whether a load explains it."""
     forgotten = dt / _FORGET_S
     for k in range(4):
@@ -203,7 +204,7 @@ def _identify_load(payload, row, torque, error, dt):
 
 
 @compiled
-def _is_slow(qd):
+def _is_slow(qd: Vector) -> bool:
     for i in range(qd.shape[0]):
         if abs(qd[i]) > _SLOW_RAD_S:
             return False
@@ -211,7 +212,7 @@ def _is_slow(qd):
 
 
 @compiled
-def _is_load(payload, known_kg):
+def _is_load(payload: Record, known_kg: float) -> bool:
     """Tell whether what acts on the arm is the weight of a body in the tool, or of one that is gone."""
     mass, moment = payload.load[0], payload.load[1:]
     unexplained = payload.unexplained_square > _UNEXPLAINED * payload.torque_square
@@ -221,7 +222,7 @@ def _is_load(payload, known_kg):
 
 
 @compiled
-def _sags(c):
+def _sags(c: Record) -> bool:
     """Tell whether a load that nobody told of keeps the tool below its target, or draws it further down, for long.
 
     Or above, where what the tool is said to carry is not there.

@@ -1,9 +1,12 @@
 """Another payload amid a motion: all that is estimated goes over to it without a step."""
 
+import numpy as np
+
 from contactsafe.control.codes import FREE, LOAD
 from contactsafe.control.link_masses import reset_link_masses
 from contactsafe.control.payload import payload_momentum_into, payload_weight_into, reset_payload
 from contactsafe.control.supervision import switch
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
@@ -11,7 +14,7 @@ from contactsafe.robot.dynamics import update_dynamics
 
 
 @compiled(nogil=True)
-def take_up(controllers, index, weight):
+def take_up(controllers: np.ndarray, index: int, weight: Vector) -> None:
     """Go over to another payload, model and all, without a step in what is estimated.
 
     Args:
@@ -46,7 +49,7 @@ def take_up(controllers, index, weight):
 
 
 @compiled
-def _move_tool_wrench(c, shown, weight):
+def _move_tool_wrench(c: Record, shown: float, weight: Vector) -> None:
     """Take the change of the payload's weight off the tool's wrench as far as it is in it."""
     tool, new_weight = c.state.tool_wrench, stack_vector(6)
     payload_weight_into(c.payload, c.dynamics.rotation, c.handle.gravity, new_weight)
@@ -58,13 +61,13 @@ def _move_tool_wrench(c, shown, weight):
 
 
 @compiled
-def _move(vector, fraction, change):
+def _move(vector: Vector, fraction: float, change: Vector) -> None:
     for i in range(vector.shape[0]):
         vector[i] += fraction * change[i]
 
 
 @compiled
-def _shown(residual, change):
+def _shown(residual: Vector, change: Vector) -> float:
     """Return the fraction of a change of gravity torque that the residual shows already: it was carried all along."""
     size = dot(change, change)
     return min(max(-dot(residual, change) / size, 0.0), 1.0) if size > 0.0 else 0.0

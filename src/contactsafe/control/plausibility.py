@@ -6,6 +6,7 @@ derives the bounds.
 
 import math
 
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 
 BRIDGE_TICKS = 20
@@ -30,7 +31,7 @@ _STUCK_RAD = 2e-5
 
 
 @compiled
-def is_usable(c):
+def is_usable(c: Record) -> bool:
     """Tell whether every number of the measurement is one that this arm can have.
 
     A broken force sensor stops the arm, but it is braked by its joints, which are still seen.
@@ -45,7 +46,7 @@ def is_usable(c):
 
 
 @compiled
-def all_usable(x):
+def all_usable(x: Vector) -> bool:
     """Tell whether no number of x is absurd: 10⁶ or more in SI units, infinite, or none at all."""
     for i in range(x.shape[0]):
         if not abs(x[i]) < 1e6:  # NaN as well
@@ -54,7 +55,7 @@ def all_usable(x):
 
 
 @compiled
-def is_unchanged(clock, m):
+def is_unchanged(clock: Record, m: Record) -> bool:
     """Tell whether all joints are measured as before to the bit."""
     for i in range(m.q.shape[0]):
         if m.q[i] != clock.q_good[i] or m.qd[i] != clock.qd_good[i]:
@@ -63,7 +64,7 @@ def is_unchanged(clock, m):
 
 
 @compiled
-def moves(m):
+def moves(m: Record) -> bool:
     """Tell whether a joint moves: noise and motion never repeat, a simulator at rest does."""
     for i in range(m.qd.shape[0]):
         if abs(m.qd[i]) > _AT_REST_RAD_S:
@@ -72,7 +73,7 @@ def moves(m):
 
 
 @compiled
-def furthest_astray(c, ticks):
+def furthest_astray(c: Record, ticks: float) -> float:
     """Largest distance of a joint from where its two velocities, before and now, allow it to be, rad."""
     clock, m = c.state.clock, c.measurement
     time, most = ticks * c.params.clock.dt, 0.0
@@ -83,7 +84,7 @@ def furthest_astray(c, ticks):
 
 
 @compiled
-def out_of_reach(c):
+def out_of_reach(c: Record) -> bool:
     """Tell whether a joint is further from where it is believed to be than any joint goes in the ticks bridged."""
     clock, m = c.state.clock, c.measurement
     fastest, furthest = 0.0, 0.0
@@ -94,7 +95,7 @@ def out_of_reach(c):
 
 
 @compiled
-def velocity_jumps(c, ticks):
+def velocity_jumps(c: Record, ticks: float) -> bool:
     """Tell whether a joint's velocity changed as nothing but a large torque changes it, and its position denies it."""
     clock, m, M = c.state.clock, c.measurement, c.dynamics.M
     time = ticks * c.params.clock.dt
@@ -108,7 +109,7 @@ def velocity_jumps(c, ticks):
 
 
 @compiled
-def should_have_moved(arm, clock):
+def should_have_moved(arm: Record, clock: Record) -> bool:
     """Tell whether a joint is believed to be elsewhere than where it was last measured."""
     for i in range(arm.q.shape[0]):
         if abs(arm.q[i] - clock.q_good[i]) > _STUCK_RAD:

@@ -1,13 +1,14 @@
 """What stands in for a measurement that is missing: the nominal dynamics predict where the arm is."""
 
 from contactsafe.control.codes import FREE
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import matvec_into, matvec_t_into
 from contactsafe.core.stack import stack_vector
 
 
 @compiled
-def predict(c, dt):
+def predict(c: Record, dt: float) -> None:
     """Move the believed arm on by dt s: q̈ = M⁻¹ (tau − friction − c − g + tau_ext), the last contact going on."""
     arm, n, known = c.state.arm, c.state.arm.q.shape[0], c.params.arm
     net = net_torque(c, stack_vector(n))
@@ -18,7 +19,7 @@ def predict(c, dt):
 
 
 @compiled
-def net_torque(c, out):
+def net_torque(c: Record, out: Vector) -> Vector:
     """Fill what accelerates the arm by all that is known, (n,), N m, and give it back.
 
     While braking no contact is counted on: what the arm pressed against lets go as it stops pressing.

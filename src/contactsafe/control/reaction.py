@@ -19,6 +19,7 @@ from contactsafe.control.codes import (
 )
 from contactsafe.control.damping import braking_limit
 from contactsafe.control.laws import torque_against_contact
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -43,13 +44,13 @@ reaction_dtype = np.dtype(
 
 
 @compiled
-def begin_reaction(reaction):
+def begin_reaction(reaction: Record) -> None:
     """Meet a contact, or end one, with no bound of an earlier one."""
     reaction.reject_decay_s, reaction.reject_limit_nm, reaction.initial_limit_n = 0.0, 0.0, math.inf
 
 
 @inlined
-def react(reaction, mode, shown, torque_nm, dt, params):
+def react(reaction: Record, mode: int, shown: int, torque_nm: float, dt: float, params: Record) -> int:
     """Return the mode that what a contact has shown asks for, and let the bounds in force fall.
 
     Args:
@@ -76,7 +77,7 @@ def react(reaction, mode, shown, torque_nm, dt, params):
 
 
 @inlined
-def contact_limit(reaction, isolation, params):
+def contact_limit(reaction: Record, isolation: Record, params: Record) -> float:
     """Return the bound in force, N m: a torque, and what a force comes to with the lever arm that isolation found."""
     comply = min(params.contact_torque_limit_comply_nm, params.contact_force_limit_comply_n * isolation.lever)
     reject = max(
@@ -87,7 +88,7 @@ def contact_limit(reaction, isolation, params):
 
 
 @inlined
-def follow_task_scale(reaction, mode, wanted, reason, step):
+def follow_task_scale(reaction: Record, mode: int, wanted: float, reason: int, step: Record) -> None:
     """Let the task scale fall at once and come back slowly, fast in mode REJECT; say what lowered it."""
     if wanted < reaction.task_scale:
         reaction.task_scale, reaction.scale_reason = wanted, reason
@@ -99,7 +100,7 @@ def follow_task_scale(reaction, mode, wanted, reason, step):
 
 
 @inlined
-def follow_posture_scale(reaction, mode, recover_gain, params):
+def follow_posture_scale(reaction: Record, mode: int, recover_gain: float, params: Record) -> None:
     """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
     if mode == FREE:
         reaction.posture_scale += recover_gain * (1.0 - reaction.posture_scale)
@@ -108,7 +109,7 @@ def follow_posture_scale(reaction, mode, recover_gain, params):
 
 
 @inlined
-def tool_task_scale(F_spring, force, contact_n, limit_n):
+def tool_task_scale(F_spring: Vector, force: Vector, contact_n: float, limit_n: float) -> tuple[float, int]:
     """Return the task scale with which the tool presses within a bound on what it touches, and its reason.
 
     Args:
@@ -129,7 +130,7 @@ def tool_task_scale(F_spring, force, contact_n, limit_n):
 
 
 @inlined
-def compensate_disturbance(J, J_bar, arm_torque, out):
+def compensate_disturbance(J: Matrix, J_bar: Matrix, arm_torque: Vector, out: Vector) -> Vector:
     """Fill −Jᵀ J#ᵀ residual of (18), (n,), N m: what takes from the task what the contact does to the tool."""
     F_arm = matvec_t_into(J_bar, arm_torque, stack_vector(6))
     matvec_t_into(J, F_arm, out)
@@ -139,7 +140,7 @@ def compensate_disturbance(J, J_bar, arm_torque, out):
 
 
 @inlined
-def bound_compensation(compensation, direction, M_inv, limit):
+def bound_compensation(compensation: Vector, direction: Vector, M_inv: Matrix, limit: float) -> float:
     """Scale a compensation in place so that it presses within a bound; return what it asked for, N m."""
     asked = torque_against_contact(direction, M_inv, compensation)
     if asked > limit:
@@ -149,7 +150,7 @@ def bound_compensation(compensation, direction, M_inv, limit):
 
 
 @inlined
-def scale_of_task(elastic_push, left, scale, reason):
+def scale_of_task(elastic_push: float, left: float, scale: float, reason: int) -> tuple[float, int]:
     """Return the task scale with which the elastic part presses within what is left of a bound; its reason."""
     if elastic_push > 0.0 and left / elastic_push < scale:
         return left / elastic_push, LIMITED_BY_CONTACT
@@ -157,7 +158,7 @@ def scale_of_task(elastic_push, left, scale, reason):
 
 
 @inlined
-def remove_excess(tau, direction, M_inv, limit):
+def remove_excess(tau: Vector, direction: Vector, M_inv: Matrix, limit: float) -> None:
     """Take off a command in place what it presses along the contact beyond a bound, a (s − s_max)."""
     excess = torque_against_contact(direction, M_inv, tau) - limit
     if excess > 0.0:
@@ -166,7 +167,9 @@ def remove_excess(tau, direction, M_inv, limit):
 
 
 @inlined
-def damp_approach(tau, direction, qd, M, joint_damping, rate, damping):
+def damp_approach(
+    tau: Vector, direction: Vector, qd: Vector, M: Matrix, joint_damping: Vector, rate: float, damping: float
+) -> None:
     """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
 
     Args:
@@ -186,7 +189,7 @@ def damp_approach(tau, direction, qd, M, joint_damping, rate, damping):
 
 
 @inlined
-def damp_contact(damping, N_removed, qd, scale, params):
+def damp_contact(damping: Vector, N_removed: Matrix, qd: Vector, scale: Vector, params: Record) -> None:
     """Add damping in the null-space direction that the contact takes out, and in all joints, in place.
 
     Args:

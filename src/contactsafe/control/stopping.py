@@ -1,6 +1,7 @@
 """How the arm is brought to rest: braked until reset, or its tool where no new target came."""
 
 from contactsafe.control.laws import task_error
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matvec
 from contactsafe.core.rotation import matrix_to_quat, quat_multiply, rotvec_to_quat
@@ -15,7 +16,7 @@ _HOLD_RAD = 0.1
 
 
 @compiled
-def stop_torque(c):
+def stop_torque(c: Record) -> Vector:
     """Stop all joints alike and hold them there: −M (2 ω q̇ + ω² (q − q_hold)), (n,), N m, without c and g.
 
     Critically damped whatever the joints' inertia. q_hold is where the arm comes to rest.
@@ -36,7 +37,7 @@ def stop_torque(c):
 
 
 @compiled
-def stop_late_target(c):
+def stop_late_target(c: Record) -> None:
     """Where no new target has come for too long, put x_d where the tool comes to rest by itself, if that is nearer.
 
     That is x + ẋ D/K on every axis, where what acts on the tool elastically is just what damps it: nothing jumps.

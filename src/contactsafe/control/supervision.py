@@ -5,11 +5,12 @@ from contactsafe.control.codes import COMPLY, FREE
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled, inlined
 
 
 @inlined
-def supervise(c):
+def supervise(c: Record) -> None:
     """Detect, isolate and classify a contact, and choose the mode.
 
     Args:
@@ -36,7 +37,7 @@ def supervise(c):
 
 
 @compiled
-def switch(state, mode):
+def switch(state: Record, mode: int) -> None:
     """Begin a contact, or end one."""
     state.mode = mode
     state.detection.contact_ticks = 0

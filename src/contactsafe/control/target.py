@@ -4,12 +4,13 @@ import math
 
 from contactsafe.control.codes import BAD_GAIN, BAD_QUATERNION, BAD_TARGET
 from contactsafe.control.plausibility import all_usable
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
 
 @inlined
-def accept_target(held, target, params):
+def accept_target(held: Record, target: Record, params: Record) -> int:
     """Take a target over where it is new and sound; return the fault where it is not, 0 for none.
 
     Args:
@@ -33,7 +34,7 @@ def accept_target(held, target, params):
 
 
 @compiled
-def _target_fault(target, params):
+def _target_fault(target: Record, params: Record) -> int:
     usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_posture)
     if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
         return BAD_TARGET
@@ -46,5 +47,5 @@ def _target_fault(target, params):
 
 
 @compiled
-def _within(value, bounds):
+def _within(value: float, bounds: Vector) -> bool:
     return bounds[0] <= value <= bounds[1]

@@ -5,6 +5,8 @@ measurement → observer → detection → isolation → identification → clas
 
 import math
 
+import numpy as np
+
 from contactsafe.control import reaction
 from contactsafe.control.classification import contact_kind
 from contactsafe.control.clock import receive, set_step
@@ -36,6 +38,7 @@ from contactsafe.control.stopping import stop_late_target, stop_torque
 from contactsafe.control.supervision import supervise
 from contactsafe.control.target import accept_target
 from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matmul
 from contactsafe.core.stack import stack_vector
@@ -43,7 +46,7 @@ from contactsafe.robot.dynamics import update_dynamics
 
 
 @compiled(nogil=True)
-def control_tick(c):
+def control_tick(c: Record) -> None:
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
     Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
@@ -75,20 +78,20 @@ def control_tick(c):
 
 
 @compiled(nogil=True)
-def tick_at(controllers, i):
+def tick_at(controllers: np.ndarray, i: int) -> None:
     """Run `control_tick` on one of an array of records: Python hands over an array far faster than a record."""
     control_tick(controllers[i])
 
 
 @compiled
-def latch(state, fault):
+def latch(state: Record, fault: int) -> None:
     """Keep the first fault since reset; 0 is none."""
     if state.fault == 0:
         state.fault = fault
 
 
 @compiled
-def _wait(c):
+def _wait(c: Record) -> None:
     """Repeat the torque that reset found until the first usable measurement; after 20 ticks go over to gravity."""
     state, clock, command = c.state, c.state.clock, c.state.command
     clock.bridged += 1
@@ -102,7 +105,7 @@ def _wait(c):
 
 
 @compiled
-def _start(c):
+def _start(c: Record) -> None:
     """Begin where the arm is: momentum as measured, command as last sent, masses as the model says."""
     state = c.state
     state.started = 1
@@ -116,7 +119,7 @@ def _start(c):
 
 
 @inlined
-def _estimate(c, J_bar):
+def _estimate(c: Record, J_bar: Matrix) -> None:
     """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
     state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
     detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
@@ -133,21 +136,28 @@ def _estimate(c, J_bar):
         memory_gain = state.step.tool_memory_gain if state.mode == FREE else 0.0
         separate_tool_wrench(tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, params.identification)
     supervise(c)
-    i, untouched = state.turn, state.mode == FREE and detection.quiet_ticks > 0
-    identify_link_masses(
-        masses, i, observer.residual[i], detection.model_uncertainty[i], dynamics.mass_regressor[i], state.step.dt,
-        untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
-    )  # fmt: skip
-    if identify_payload(c) and state.clock.braking == 0 and state.limits.runaway == 0:
-        state.fault = LOAD  # it takes the place of faults that are over
-    state.turn = (i + 1) % state.arm.q.shape[0]
+    _identify(c)
     if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
         state.fault, state.limits.runaway = RUNAWAY, 1
     state.clock.since = 0.0
 
 
 @inlined
-def _law(c, Lambda, J_bar):
+def _identify(c: Record) -> None:
+    """Identify link masses and payload, one joint a tick in turn."""
+    state, params, observer, dynamics = c.state, c.params, c.state.observer, c.dynamics
+    i, untouched = state.turn, state.mode == FREE and state.detection.quiet_ticks > 0
+    identify_link_masses(
+        state.link_masses, i, observer.residual[i], state.detection.model_uncertainty[i], dynamics.mass_regressor[i],
+        state.step.dt, untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
+    )  # fmt: skip
+    if identify_payload(c) and state.clock.braking == 0 and state.limits.runaway == 0:
+        state.fault = LOAD  # it takes the place of faults that are over
+    state.turn = (i + 1) % state.arm.q.shape[0]
+
+
+@inlined
+def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; without c and g, (n,), N m."""
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
     arm, impedance, react, tool = state.arm, state.impedance, state.reaction, state.tool_wrench
@@ -179,7 +189,9 @@ def _law(c, Lambda, J_bar):
 
 
 @inlined
-def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
+def _contact_law(
+    c: Record, elastic: Vector, damping: Vector, compensation: Vector, N_removed: Matrix, scale: float, reason: int
+) -> Vector:
     """Bound the commanded contact force: by compensation, task scale and, last, damping; then damp the approach.
 
     Args:
@@ -211,7 +223,7 @@ def _contact_law(c, elastic, damping, compensation, N_removed, scale, reason):
 
 
 @inlined
-def _send(c, tau):
+def _send(c: Record, tau: Vector) -> None:
     """Limit the command, given without c and g; remember it and report."""
     state, dynamics, out = c.state, c.dynamics, c.output
     scaled = state.reaction.task_scale

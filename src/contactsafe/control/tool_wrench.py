@@ -3,6 +3,7 @@
 import numpy as np
 
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import inlined
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -23,7 +24,15 @@ def tool_wrench_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def separate_tool_wrench(tool, detection_residual, observer, J, J_bar, memory_gain, params):
+def separate_tool_wrench(
+    tool: Record,
+    detection_residual: Vector,
+    observer: Record,
+    J: Matrix,
+    J_bar: Matrix,
+    memory_gain: float,
+    params: Record,
+) -> None:
     """Split the residual into the tool's part and the arm's, where no force sensor does.
 
     A wrench at the tool never shows in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force
@@ -55,7 +64,7 @@ def separate_tool_wrench(tool, detection_residual, observer, J, J_bar, memory_ga
 
 
 @inlined
-def take_all_for_the_arm(tool, detection_residual, observer):
+def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Record) -> None:
     """Take all of the residual for the arm's contact: the tool's wrench is known, or nothing tells it apart."""
     detection_residual[:] = observer.residual_fast
     tool.arm_torque[:] = observer.residual
@@ -63,7 +72,7 @@ def take_all_for_the_arm(tool, detection_residual, observer):
 
 
 @inlined
-def follow_tool_force(tool, arm, residual_fast, J_bar, gain):
+def follow_tool_force(tool: Record, arm: Record, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r."""
     wrench = stack_vector(6)
     if arm.has_wrench != 0:

@@ -1,4 +1,4 @@
-"""The surface of an arm: points of its surface where something may touch it, and the way that thing can push there."""
+"""The surface of an arm: points where something may touch it, and the direction in which it can push there."""
 
 import copy
 import math
@@ -44,10 +44,10 @@ def _capsule_points(link: int, capsule: Capsule) -> np.ndarray:
     side /= np.linalg.norm(side)
     other = np.cross(axis, side)
     rows = []
-    for share in np.linspace(0.0, 1.0, _ALONG):
+    for fraction in np.linspace(0.0, 1.0, _ALONG):
         for turn in np.arange(_AROUND) * 2 * math.pi / _AROUND:
             normal = math.cos(turn) * side + math.sin(turn) * other
-            rows.append([link, *(start + share * (end - start) + capsule.radius * normal), *normal])
+            rows.append([link, *(start + fraction * (end - start) + capsule.radius * normal), *normal])
     return np.array(rows)
 
 
@@ -65,14 +65,12 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
     """
     seen = copy.copy(model)
     seen.geom_matid[:], seen.geom_rgba[:, 3] = -1, 1.0  # rays pass through what is transparent
-    found = {}
+    found, rows = {}, [np.zeros((0, SURFACE_COLUMNS))]
     for link in range(2, len(origins) + 1):
         geoms = np.flatnonzero(link_of[model.geom_bodyid] == link)
         solid = geoms[(model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)]
-        points = _surface(seen, data, solid if solid.size else geoms)
-        if len(points):
+        if len(points := _surface(seen, data, solid if solid.size else geoms)):
             found[link] = points
-    rows = [np.zeros((0, SURFACE_COLUMNS))]
     for link, points in found.items():
         points = _spread(points, _POINTS // len(found))
         points[:, :3] -= origins[link - 1]
