@@ -1,4 +1,4 @@
-"""What goes on after the arm has given way is a push, what falls as a spring would is an obstacle."""
+"""What goes on after the arm has receded is a push, what falls as a spring would is an obstacle."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +13,7 @@ displacements = st.floats(1e-4, 0.1)
 
 @given(stiffness=st.floats(SOFTEST, 1e6), lever=levers, displacement=displacements)
 def test_no_spring_as_stiff_as_the_softest_obstacle_is_a_push(stiffness, lever, displacement):
-    """At a lever arm l a spring of k N/m loses k l² N m for every radian of giving way."""
+    """At a lever arm l a spring of k N/m loses k l² N m for every radian that the arm recedes."""
     assert not is_push(stiffness * lever**2 * displacement, displacement, lever, SOFTEST)
 
 

@@ -228,7 +228,7 @@ def test_arm_in_contact_is_held_through_twenty_lost_measurements(panda, at, time
     ],
 )
 def test_beyond_twenty_ticks_the_arm_flew_and_nothing_was_said(panda, seen, fault, timed):
-    """12.8 rad/s after 300 ms of a frozen measurement. Now it stops within 0.15 s of its way, and says why."""
+    """12.8 rad/s after 300 ms of a frozen measurement. Now it stops within 0.15 s of its motion, and says why."""
     found = run(panda, seen, timed=timed)
     assert found.fault == FAULTS[9 if fault == 8 and not timed else fault]
     assert found.step() <= 1.0
@@ -394,10 +394,10 @@ def test_same_measurement_with_its_time_again_and_again_was_nothing_at_rest(pand
     assert outputs[21].fault == FAULTS[7]
 
 
-@pytest.mark.parametrize("ahead", [0.03, 1000.0, 1e15])
-def test_one_time_far_ahead_blinded_the_arm_until_reset(panda, ahead):
+@pytest.mark.parametrize("late_s", [0.03, 1000.0, 1e15])
+def test_one_time_far_in_the_future_blinded_the_arm_until_reset(panda, late_s):
     """It brakes the arm; the times after it, earlier all of them, were not believed any more."""
-    found = run(panda, lambda k, m, past: m._replace(time=0.001 * k + ahead * (k == AT)), 1500)
+    found = run(panda, lambda k, m, past: m._replace(time=0.001 * k + late_s * (k == AT)), 1500)
     assert found.fault == FAULTS[8]
     assert found.step() <= 1.0
     assert max(out.bridged for out in found.outputs) == 0

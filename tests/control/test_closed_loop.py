@@ -86,12 +86,12 @@ def test_contact_law_cancels_what_the_residual_shows_and_nothing_else(quick_pand
 
 
 def test_joint_driven_outwards_stops_inside_its_range(panda):
-    """The tool is asked to turn about its own axis, 0.3 rad ahead of where it is, until joint 7 has no more to give."""
+    """The tool is asked to turn about its own axis, 0.3 rad from where it is, until joint 7 has no more to give."""
     plant, controller = Plant(panda), controller_at(panda, FREE)
     home, highest = panda.tool_pose(panda.home), 0.0
     for k in range(400):
-        ahead = min(0.01 * k, plant.q[6] - panda.home[6] + 0.3)
-        quat = quat_multiply(home.quat, rotvec_to_quat(np.array([0.0, 0.0, ahead])))
+        offset = min(0.01 * k, plant.q[6] - panda.home[6] + 0.3)
+        quat = quat_multiply(home.quat, rotvec_to_quat(np.array([0.0, 0.0, offset])))
         plant.run(controller, Target(Pose(home.position, quat), STIFFNESS, posture=panda.home), 17)
         highest = max(highest, plant.q[6])
     assert panda.q_max[6] - 0.1 < highest < panda.q_max[6]

@@ -1,4 +1,4 @@
-"""Yield to what is in the way, hold against what pushes; and never push a contact harder than the bound in force."""
+"""Comply with obstacles, reject pushes, and never press with more than the bound in force."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ SAFE = presets.safe().with_(friction_compensation=False)
 
 
 def collision(panda, stiffness, seconds=2.0):
-    """Send the tool sideways by 25 cm, 5 cm ahead at most, the wrist against a sphere; yield what happens each tick."""
+    """Send the tool sideways by 25 cm, at most 5 cm off, the wrist against a sphere; yield what happens each tick."""
     plant = wrist_meets_sphere(panda, 0.04, stiffness)
     controller = controller_at(panda, SAFE)
     start = plant.tool_position()[1]

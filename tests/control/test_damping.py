@@ -90,7 +90,7 @@ def test_the_limit_is_within_a_factor_of_two_of_what_is_unstable(panda, six_join
         M_inv, limits = arm.dynamics(q, np.zeros(arm.n))["M_inv"], np.empty(arm.n)
         joint_damping_limits(M_inv, largest_damping(delay) / DT, limits)
         loosen_limits(M_inv, largest_damping(delay) / DT, limits)
-        assert still_moves(M_inv, 0.98 * limits, delay) < 10.0  # what is braked slowly is still on its way
+        assert still_moves(M_inv, 0.98 * limits, delay) < 10.0  # what is braked slowly still moves
         assert still_moves(M_inv, 2.0 * limits, delay) > 1e3
 
 

@@ -107,9 +107,9 @@ def swept(arm, K, ticks=4000):
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):
         if k % 340 == 0:
-            way = np.clip(rng.normal(size=3) * 0.3, -0.05, 0.05)
+            offset = np.clip(rng.normal(size=3) * 0.3, -0.05, 0.05)
         if k % 17 == 0:
-            position = np.clip(plant.tool_position() + way, home.position - 0.15, home.position + 0.15)
+            position = np.clip(plant.tool_position() + offset, home.position - 0.15, home.position + 0.15)
             target = Target(Pose(position, home.quat), np.full(6, K), posture=arm.home)
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd

@@ -52,7 +52,7 @@ def test_task_inertia_is_the_inverse_of_mobility(seed):
 
 @given(seeds, st.integers(0, 5), st.floats(0.0, 1.0))
 def test_task_inertia_stays_bounded_when_a_direction_is_lost(seed, row, kept):
-    """At the singularity itself no eigenvalue exceeds 1/λ² = 20: no force grows without bound on the way there."""
+    """At the singularity itself no eigenvalue exceeds 1/λ² = 20: no force grows without bound on approach."""
     J, M_inv, _ = random_arm(seed, undamped=False)
     J[row] *= kept * 1e-6
     Lambda, _ = task_inertia(J, M_inv, FLOOR, DAMPING)
@@ -125,12 +125,12 @@ def test_contact_in_task_directions_leaves_the_null_space_alone(seed):
 
 
 def test_impedance_gives_each_axis_its_own_acceleration():
-    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), the pull and the damping apart."""
+    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), stiffness and damping apart."""
     K, D = np.arange(10.0, 16.0), np.arange(1.0, 7.0)
     e, v, a = np.full(6, 0.1), np.full(6, 0.2), np.full(6, 0.3)
-    pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
-    assert_allclose(pull, 0.2 * K, rtol=0, atol=1e-14)
-    assert_allclose(pull + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
+    elastic, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
+    assert_allclose(elastic, 0.2 * K, rtol=0, atol=1e-14)
+    assert_allclose(elastic + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
 
 
 @given(seeds, st.floats(0.0, 0.08), st.floats(0.0, 200.0))

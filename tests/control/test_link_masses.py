@@ -1,4 +1,4 @@
-"""The links are weighed while nothing touches the arm; what is learned comes off the residual and the threshold."""
+"""Link masses are identified while nothing touches the arm; that comes off the residual and the threshold."""
 
 import copy
 
@@ -15,7 +15,7 @@ from contactsafe.control.laws import identify_masses
 from contactsafe.robot.dynamics import dynamics_dtype, mass_regressor, update_dynamics
 
 SAFE = presets.safe().with_(friction_compensation=False)
-WAY = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
+PATH = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
 
 ANY = np.full(8, np.inf)
 """No bound on the mass of a link."""
@@ -82,7 +82,7 @@ def heavier(arm, scale):
 def moved(arm, config, model=None):
     """Move about for 2 s; give the controller, its plant, the mean residual of the last 0.25 s and contact ticks."""
     plant, controller, seen, contacts = Plant(arm, model=model), controller_at(arm, config), [], 0
-    for offset in WAY:
+    for offset in PATH:
         target = reach(arm, offset)
         for _ in range(500):
             out = plant.run(controller, target, 1, UNTOUCHED)
@@ -94,10 +94,10 @@ def moved(arm, config, model=None):
 @pytest.mark.parametrize("scale", [1.1, 0.9])
 def test_links_that_weigh_ten_percent_more_or_less_do_not_show_after_two_seconds(panda, scale):
     """Bias of the residual 0.31 to 0.35 N m; 2.1 N m where the model is trusted."""
-    *_, weighed, contacts = moved(panda, SAFE, heavier(panda, scale))
+    *_, correction, contacts = moved(panda, SAFE, heavier(panda, scale))
     trusting = SAFE.with_(mass_uncertainty=0.0, contact_aware=False)  # or what it takes for contact moves the arm
     *_, trusted, _ = moved(panda, trusting, heavier(panda, scale))
-    assert np.abs(weighed).max() < 0.5
+    assert np.abs(correction).max() < 0.5
     assert np.abs(trusted).max() > 1.5
     assert contacts == 0
 
@@ -159,7 +159,7 @@ def test_what_is_learned_does_not_move_the_arm(panda):
     for config in (SAFE, SAFE.with_(mass_uncertainty=0.0, payload_uncertainty_kg=0.0)):
         plant, controller = Plant(panda, model=heavier(panda, 1.03)), controller_at(panda, config)
         seen = []
-        for offset in WAY:
+        for offset in PATH:
             for _ in range(300):
                 seen.append(plant.run(controller, reach(panda, offset), 1, UNTOUCHED).torque)
         assert not controller.record["output"]["mode"]
@@ -171,7 +171,7 @@ def test_what_is_learned_does_not_move_the_arm(panda):
 
 @pytest.mark.parametrize("wrench", [None, UNTOUCHED])
 def test_not_knowing_does_not_grow_beyond_what_it_was_at_first(panda, wrench):
-    """Without a force sensor nothing is weighed; thresholds would otherwise rise until nothing is found."""
+    """Without a force sensor no mass is identified; thresholds would otherwise rise until nothing is detected."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 1, wrench)
     first = controller.record["state"]["link_masses"]["gravity_sigma"].copy()
@@ -181,6 +181,6 @@ def test_not_knowing_does_not_grow_beyond_what_it_was_at_first(panda, wrench):
 
 def test_a_threshold_without_end_keeps_the_torque_finite(panda):
     plant, controller = Plant(panda), controller_at(panda, SAFE.with_(residual_threshold=np.inf))
-    out = plant.run(controller, reach(panda, WAY[0]), 300, UNTOUCHED)
+    out = plant.run(controller, reach(panda, PATH[0]), 300, UNTOUCHED)
     assert np.isfinite(out.torque).all()
     assert out.fault == "none"

@@ -1,4 +1,4 @@
-"""What the tool carries is weighed at rest, taken over without a jump, and never sinks in silence."""
+"""What the tool carries is identified at rest, taken over without a jump, and never sinks in silence."""
 
 import copy
 import pickle

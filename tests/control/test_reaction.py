@@ -128,7 +128,7 @@ def test_a_contact_begins_without_a_bound_of_an_earlier_one():
 
 @given(seeds, st.floats(0.0, 60.0), st.floats(0.0, 40.0))
 def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed, touch, bound):
-    """Along the force felt, from twice the least contact on; a pull within the bound is left as it is."""
+    """Along the force felt, from twice the least contact on; a force within the bound is left as it is."""
     rng = np.random.default_rng(seed)
     F, n = rng.normal(size=6) * 30.0, rng.normal(size=3)
     n /= np.linalg.norm(n)

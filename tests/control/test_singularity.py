@@ -60,7 +60,7 @@ def test_task_inertia_is_proportional_to_the_arms_density(times, wrist):
 
 
 def test_floor_and_damping_of_the_panda(panda):
-    """w₀ and λ² as they were before they became shares of the arm's own."""
+    """w₀ and λ² as they were before they became fractions of the arm's own."""
     params = Controller(panda).record["params"]
     assert_allclose(params["impedance"]["manipulability_floor"], 0.01, rtol=0.01)
     assert_allclose(params["impedance"]["manipulability_damping"], 0.05, rtol=0.01)

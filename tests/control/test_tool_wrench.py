@@ -28,13 +28,13 @@ def wipe(arm, force, config=SAFE, ticks=2000):
 @pytest.mark.parametrize("force", [8.0, 20.0, 40.0])
 def test_board_under_the_tool_is_no_contact_of_the_arm(panda, force):
     """Torques of the tool of 4 N m and more; what is held against the threshold is 0.05 N m."""
-    felt, alarm = 0.0, 0.0
+    felt, highest = 0.0, 0.0
     for out, controller in wipe(panda, force):
         assert not out.contact.in_contact
         felt = max(felt, np.abs(out.contact.torque).max())
-        alarm = max(alarm, np.abs(controller.record["state"]["detection"]["residual"]).max())
+        highest = max(highest, np.abs(controller.record["state"]["detection"]["residual"]).max())
     assert felt > 0.2 * force
-    assert alarm < 0.05
+    assert highest < 0.05
 
 
 def test_board_under_the_tool_is_a_contact_to_the_paper(panda):
@@ -108,6 +108,6 @@ def test_obstacle_before_the_wrist_is_pressed_no_harder_than_one_before_the_tool
     plant = wrist_meets_sphere(panda, 0.04, 2000.0)
     controller, start = controller_at(panda, SAFE), plant.tool_position()[1]
     for k in range(120):
-        ahead = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
-        plant.run(controller, reach(panda, [0.0, ahead, 0.0]), 17)
+        offset = min(0.25, 0.125 * k / 60, plant.tool_position()[1] - start + 0.05)
+        plant.run(controller, reach(panda, [0.0, offset, 0.0]), 17)
     assert np.linalg.norm(plant.data.qfrc_constraint[7:10]) < SAFE.reaction.tool_force_limit_n

@@ -71,7 +71,7 @@ def receive(c: Record, usable: bool) -> None:
     """
     state, clock = c.state, c.state.clock
     usual = 1.0 if abs(clock.pace - 1.0) < _SAME_PACE else clock.pace
-    reason, since, timed = _judge(c, clock.since + usual) if usable else (MISSING, clock.since + usual, False)
+    reason, since, timed = _assess(c, clock.since + usual) if usable else (MISSING, clock.since + usual, False)
     if clock.braking != 0 and reason == UNTRUE:
         reason, clock.at_rest = 0, 0  # whatever is measured now is where the arm is
     if reason == 0:
@@ -90,7 +90,7 @@ def receive(c: Record, usable: bool) -> None:
 
 
 @compiled
-def _judge(c: Record, ticks: float) -> tuple[int, float, bool]:
+def _assess(c: Record, ticks: float) -> tuple[int, float, bool]:
     """Tell what is wrong with the measurement, how many ticks passed since the last good one, whether a clock says so.
 
     Nothing is wrong: 0. No tick passed where it is the last one again by its time as well.

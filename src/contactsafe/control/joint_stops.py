@@ -29,7 +29,7 @@ def stops_dtype(n: int) -> np.dtype:
             ("intrusion", _f, (n,)),  # into the margin, positive at the upper end, rad
             ("brake", _f, (n,)),  # per excess of speed, N m s/rad
             ("spring", _f, (n,)),  # per intrusion, N m/rad
-            ("drag", _f, (n,)),  # on the way out of the margin, N m s/rad
+            ("drag", _f, (n,)),  # of motion out of the margin, N m s/rad
         ]
     )
 
@@ -130,8 +130,8 @@ def joint_stop_gains(
 def joint_stop_torque(stops: Record, tau_net: Vector, M_inv: Matrix, qd: Vector, margin: float) -> None:
     """Keep joints in their range and below their speed limits, in place; away from both nothing changes.
 
-    What is too fast is braked, and what drives it on fades; within the margin a spring pushes back, damped on the way
-    out as well. What drives a joint on is its own torque, or the acceleration that the whole command gives it, as a
+    What is too fast is braked, and what drives it on fades; within the margin a spring pushes back, damped on the
+    return as well. What drives a joint on is its own torque, or the acceleration that the whole command gives it, as a
     torque of its own, (M⁻¹ τ)_i/(M⁻¹)_ii, whichever is more. Its own counts up to `_RELEASE_RAD_S2` of the inertia that
     the joint moves alone: on a chain of parallel axes it may be just what holds the joint against all the others.
 

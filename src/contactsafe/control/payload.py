@@ -223,7 +223,7 @@ def _is_load(payload: Record, known_kg: float) -> bool:
 
 @compiled
 def _sags(c: Record) -> bool:
-    """Tell whether a load that nobody told of keeps the tool below its target, or draws it further down, for long.
+    """Tell whether a load that nobody told of keeps the tool below its target, or lets it sink, for long.
 
     Or above, where what the tool is said to carry is not there.
     """

@@ -123,7 +123,7 @@ def _refuse_unsound_limits(arm) -> None:
 
 
 def _refuse_unsound_friction(arm) -> None:
-    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is what it takes both ways together."""
+    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is the sum of both directions."""
     for i, (phi1, phi2, phi3) in enumerate(arm.friction):
         most = 2.0 * arm.tau_max[i]
         if not 0.0 <= phi1 <= most:

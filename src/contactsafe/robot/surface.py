@@ -16,8 +16,8 @@ _ALONG, _AROUND = 5, 12
 _POINTS = 480
 """Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
 
-_STARTS, _WAYS = 1000, 5
-"""Of the lines that look for a link's surface; few ways from a start, or the points would huddle before it."""
+_STARTS, _DIRECTIONS = 1000, 5
+"""Of the lines that look for a link's surface; few directions from a start, or the points would huddle before it."""
 
 _TURN_M = 0.02
 """Points whose normals differ by 1 count as so far apart: a thin plate has two sides."""
@@ -92,19 +92,21 @@ def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> n
     centre = data.geom_xpos[geoms].mean(axis=0)
     radius = 1.01 * np.max(np.linalg.norm(data.geom_xpos[geoms] - centre, axis=1) + model.geom_rbound[geoms])
     rng = np.random.default_rng(0)
-    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _WAYS))
-    ways = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
-    distances, normals = np.zeros((_STARTS, _WAYS)), np.zeros((_STARTS, 3 * _WAYS))
-    geom = np.zeros(_WAYS, dtype=np.int32)
-    for start, way, distance, normal in zip(starts, ways, distances, normals, strict=True):
-        mujoco.mj_multiRay(model, data, start[0], way.ravel(), group, True, -1, geom, distance, normal, _WAYS, np.inf)
-    normals = normals.reshape(ways.shape)
-    normals *= -np.sign(np.sum(normals * ways, axis=2, keepdims=True))  # faces of a mesh may be wound either way
-    return np.concatenate([starts + distances[..., None] * ways, normals], axis=2)[distances >= 0.0]
+    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _DIRECTIONS))
+    directions = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
+    distances, normals = np.zeros((_STARTS, _DIRECTIONS)), np.zeros((_STARTS, 3 * _DIRECTIONS))
+    geom = np.zeros(_DIRECTIONS, dtype=np.int32)
+    for start, direction, distance, normal in zip(starts, directions, distances, normals, strict=True):
+        mujoco.mj_multiRay(
+            model, data, start[0], direction.ravel(), group, True, -1, geom, distance, normal, _DIRECTIONS, np.inf
+        )
+    normals = normals.reshape(directions.shape)
+    normals *= -np.sign(np.sum(normals * directions, axis=2, keepdims=True))  # whichever side a face has
+    return np.concatenate([starts + distances[..., None] * directions, normals], axis=2)[distances >= 0.0]
 
 
 def _on_sphere(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
-    """Draw points of the unit sphere, (*shape, 3)."""
+    """Sample points of the unit sphere, (*shape, 3)."""
     points = rng.normal(size=(*shape, 3))
     return points / np.linalg.norm(points, axis=2, keepdims=True)
 

@@ -22,8 +22,7 @@ from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, lis
 from contactsafe.robot.description import Inertia
 from contactsafe.robot.surface import geom_surface
 
-_BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
-_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+_BODY, _KEY, _HINGE = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY, mujoco.mjtJoint.mjJNT_HINGE
 _NOTHING = 1e-12
 """Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
 
@@ -67,7 +66,7 @@ def from_mjcf(
         An arm without description and tool. Limits that the model does not give are inf, as those of speed.
 
     Raises:
-        InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
+        InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or does not move the
             site, the choice of joints or actuators is ambiguous, torque limits are missing, a body of the arm
             carries its own weight (gravcomp), an equality constraint ties the arm, or gravity or a range is no number.
     """
@@ -150,14 +149,14 @@ def _loaded(scene) -> mujoco.MjModel:
 def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> list[int]:
     """Choose the arm's joints among those that move the site, from base to tip."""
     moving = _joints_above(model, model.site_bodyid[site_id])
-    site, way = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
+    site, rest = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
     chosen = moving if names is None else [find(model, JOINT, name) for name in names]
     if not moving or not chosen:
-        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {way}")
+        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {rest}")
     for joint in chosen:
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if joint not in moving:
-            problem = f"does not move site {site}; joints that do, base to tip: {way}"
+            problem = f"does not move site {site}; joints that do, base to tip: {rest}"
         elif kind != _HINGE:
             word = kind.name.removeprefix("mjJNT_").lower()
             problem = f"is of type {word}; the arm's are hinges: give joints=[...] without it, to lock it"
@@ -167,7 +166,9 @@ def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> 
             continue
         raise InvalidInputError(f"joint {label(model, JOINT, joint)} {problem}")
     if chosen != [joint for joint in moving if joint in chosen]:
-        raise InvalidInputError(f"joints = {list(names or ())} are not in order; from base to tip they stand so: {way}")
+        raise InvalidInputError(
+            f"joints = {list(names or ())} are not in order; from base to tip they stand so: {rest}"
+        )
     return chosen
 
 
