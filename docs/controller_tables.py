@@ -6,23 +6,25 @@ from dataclasses import Field, fields
 from contactsafe import presets
 from contactsafe.control.codes import FAULTS
 from contactsafe.control.config import STAGES
-from contactsafe.control.parameter import declaration
+from contactsafe.control.parameter import allowed, declaration
 
 NAMES = ("vices", "paper", "safe")
 
 
 def parameters() -> str:
-    """Every parameter by stage, with unit, meaning and value in each preset; what differs from `paper` in bold."""
-    header = "| parameter | unit | meaning | " + " | ".join(f"`{name}()`" for name in NAMES) + " |"
-    return "\n".join([header, "|---" * 6 + "|", *_rows()])
+    """Every parameter by stage: unit, bounds, meaning and value in each preset; what differs from `paper` in bold."""
+    header = "| parameter | unit | allowed | meaning | " + " | ".join(f"`{name}()`" for name in NAMES) + " |"
+    return "\n".join([header, "|---" * 7 + "|", *_rows()])
 
 
 def _rows() -> Iterator[str]:
     for stage, kind in STAGES.items():
-        yield f"| **{stage}** | | {(kind.__doc__ or '').split(chr(10))[0].rstrip('.')} | | | |"
+        yield f"| **{stage}** | | | {(kind.__doc__ or '').split(chr(10))[0].rstrip('.')} | | | |"
         for field in fields(kind):
             known = declaration(field)
-            yield " | ".join([f"| `{field.name}`", known.unit, known.doc, *_values(stage, field)]) + " |"
+            yield (
+                " | ".join([f"| `{field.name}`", known.unit, allowed(field), known.doc, *_values(stage, field)]) + " |"
+            )
 
 
 def _values(stage: str, field: Field) -> Iterator[str]:

@@ -28,10 +28,10 @@ def test_all_tables_stand_in_the_page(tables):
     assert tables.faults() in filled
 
 
-def test_every_parameter_has_a_row_with_meaning_and_three_values(tables):
+def test_every_parameter_has_a_row_with_bounds_meaning_and_three_values(tables):
     rows = [line.strip("| ").split(" | ") for line in tables.parameters().splitlines() if line.startswith("| `")]
     assert [row[0].strip("`") for row in rows] == list(STAGE_OF)
-    assert all(len(row) == 6 and all(row[2:]) for row in rows)
+    assert all(len(row) == 7 and all(row[2:]) for row in rows)
 
 
 def test_every_value_of_safe_that_is_its_own_has_a_reason(tables):

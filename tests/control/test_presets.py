@@ -67,6 +67,28 @@ def test_preset_by_name(name):
     assert presets.by_name(name) == getattr(presets, name)()
 
 
+def test_preset_with_other_values_of_parameters():
+    config = presets.by_name("safe:tank_j=2:passive_gains=no:stiffness_range=20/900:K_posture=30/20")
+    assert config == presets.safe().with_(
+        tank_j=2.0, passive_gains=False, stiffness_range=(20.0, 900.0), K_posture=(30.0, 20.0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("safe:tank_j", "'tank_j' in 'safe:tank_j' has no value; write parameter=value"),
+        ("safe:tank=2", "parameter 'tank' is unknown; did you mean 'tank_s'?"),
+        ("safe:tank_s=0", "tank_s = 0.0 must be greater than 0"),
+        ("gentle:tank_j=2", "controller 'gentle' is unknown; choose from vices, paper, safe"),
+    ],
+)
+def test_preset_with_values_that_cannot_be(name, text):
+    with pytest.raises(InvalidInputError) as caught:
+        presets.by_name(name)
+    assert str(caught.value) == text
+
+
 def test_unknown_preset():
     with pytest.raises(InvalidInputError) as caught:
         presets.by_name("gentle")

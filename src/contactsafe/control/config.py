@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from contactsafe.control.damping import GAIN_MARGIN, largest_damping
-from contactsafe.control.parameter import Stage, parameter
+from contactsafe.control.parameter import Stage, from_text, parameter
 from contactsafe.core.errors import InvalidInputError
 
 _INF = math.inf
@@ -251,11 +251,7 @@ class ControllerConfig:
         """
         by_stage: dict[str, dict[str, Any]] = {}
         for name, value in changed.items():
-            if name not in STAGE_OF:
-                near = difflib.get_close_matches(name, STAGE_OF, 1)
-                remedy = f"did you mean '{near[0]}'?" if near else f"choose from {', '.join(STAGE_OF)}"
-                raise InvalidInputError(f"parameter '{name}' is unknown; {remedy}")
-            by_stage.setdefault(STAGE_OF[name], {})[name] = value
+            by_stage.setdefault(stage_of(name), {})[name] = value
         return replace(self, **{stage: replace(getattr(self, stage), **values) for stage, values in by_stage.items()})
 
 
@@ -264,6 +260,29 @@ STAGES: dict[str, type[Stage]] = {declared.name: declared.default_factory for de
 
 STAGE_OF = {declared.name: name for name, stage in STAGES.items() for declared in fields(stage)}
 """The stage of each parameter."""
+
+
+def stage_of(name: str) -> str:
+    """Return the name of a parameter's stage.
+
+    Raises:
+        InvalidInputError: no such parameter.
+    """
+    if name not in STAGE_OF:
+        near = difflib.get_close_matches(name, STAGE_OF, 1)
+        remedy = f"did you mean '{near[0]}'?" if near else f"choose from {', '.join(STAGE_OF)}"
+        raise InvalidInputError(f"parameter '{name}' is unknown; {remedy}")
+    return STAGE_OF[name]
+
+
+def value_from_text(name: str, text: str) -> Any:
+    """Return the value of a parameter as written on a command line; see `parameter.from_text`.
+
+    Raises:
+        InvalidInputError: no such parameter, or text that says no value of it.
+    """
+    declared = next(declared for declared in fields(STAGES[stage_of(name)]) if declared.name == name)
+    return from_text(declared, text)
 
 
 def damping_rate(config: ControllerConfig, margin: float) -> float:

@@ -1,6 +1,7 @@
 """A parameter is declared once: default, unit, bounds and a sentence, in the field of the stage that reads it.
 
-From the declaration come the check of a value, the record that compiled code reads, and the table in the documentation.
+From the declaration come the check of a value, how it is written on a command line, the record that compiled code
+reads, and the table in the documentation.
 """
 
 from dataclasses import Field, dataclass, field, fields
@@ -79,6 +80,36 @@ def _check_numbers(declared: Field, value: Any) -> None:
         fits, wanted = numbers.shape == shape, "(lowest, highest)" if shape else "one number"
     if not fits:
         raise InvalidInputError(f"{name} = {value} has the wrong shape; give {wanted}")
+
+
+def allowed(declared: Field) -> str:
+    """Return in words which values a parameter may have, as the documentation lists them."""
+    known = declaration(declared)
+    if isinstance(declared.default, bool):
+        return "yes, no"
+    if known.fraction:
+        return "> 0, ≤ 1"
+    numbers = ("> 0" if known.positive else "≥ 0") + (" or ∞" if known.infinite else "")
+    if known.per_joint:
+        return f"{numbers}, each"
+    return f"{numbers}, lowest < highest" if _shape(declared) else numbers
+
+
+def from_text(declared: Field, text: str) -> Any:
+    """Return the value of a parameter as written on a command line: yes or no, a number, or numbers with / between.
+
+    Raises:
+        InvalidInputError: it is none of these.
+    """
+    if isinstance(declared.default, bool):
+        if text not in ("yes", "no"):
+            raise InvalidInputError(f"{declared.name} = {text!r} is a switch; give yes or no")
+        return text == "yes"
+    try:
+        numbers = tuple(float(word) for word in text.split("/"))
+    except ValueError:
+        raise InvalidInputError(f"{declared.name} = {text!r} is not made of numbers; give numbers ≥ 0") from None
+    return numbers if len(numbers) > 1 or declaration(declared).per_joint else numbers[0]
 
 
 def _shape(declared: Field) -> tuple[int, ...]:

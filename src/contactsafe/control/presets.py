@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from contactsafe.control.config import ControllerConfig
+from contactsafe.control.config import ControllerConfig, value_from_text
 from contactsafe.core.errors import InvalidInputError
 
 __all__ = ["PRESETS", "SAFE", "by_name", "paper", "safe", "vices"]
@@ -74,11 +74,21 @@ PRESETS: dict[str, Callable[[], ControllerConfig]] = {"vices": vices, "paper": p
 
 
 def by_name(name: str) -> ControllerConfig:
-    """Look a preset up by its name.
+    """Return a preset by its name, as it is or with other values of parameters: `safe:tank_j=2:passive_gains=no`.
+
+    Args:
+        name: of the preset; then, each after a colon, parameters and their values (`parameter.from_text`).
 
     Raises:
-        InvalidInputError: no such preset.
+        InvalidInputError: no such preset or parameter, or a value that no controller can mean.
     """
-    if name not in PRESETS:
-        raise InvalidInputError(f"controller '{name}' is unknown; choose from {', '.join(PRESETS)}")
-    return PRESETS[name]()
+    preset, *changes = name.split(":")
+    if preset not in PRESETS:
+        raise InvalidInputError(f"controller '{preset}' is unknown; choose from {', '.join(PRESETS)}")
+    changed = {}
+    for change in changes:
+        parameter, equals, text = change.partition("=")
+        if not equals:
+            raise InvalidInputError(f"'{change}' in '{name}' has no value; write parameter=value")
+        changed[parameter] = value_from_text(parameter, text)
+    return PRESETS[preset]().with_(**changed)
