@@ -22,9 +22,10 @@ from contactsafe.control.plausibility import (
     should_have_moved,
     velocity_jumps,
 )
-from contactsafe.control.prediction import predict
+from contactsafe.control.prediction import net_torque, predict
 from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
+from contactsafe.core.stack import stack_vector
 
 _f = np.float64
 _i = np.int64
@@ -63,21 +64,19 @@ def clock_dtype(n: int) -> np.dtype:
 
 @compiled
 def receive(c: Record, usable: bool) -> None:
-    """Take the measurement over, or predict what it should have been; count the ticks that passed.
-
-    Args:
-        c: `controller_dtype` record.
-        usable: what `is_usable` says.
-    """
+    """Take a measurement that `is_usable` over, or predict what it should have been; count the ticks that passed."""
     state, clock = c.state, c.state.clock
     usual = 1.0 if abs(clock.pace - 1.0) < _SAME_PACE else clock.pace
-    reason, since, timed = _assess(c, clock.since + usual) if usable else (MISSING, clock.since + usual, False)
+    reason, since, timed = MISSING, clock.since + usual, False
+    if usable:
+        reason, since, timed = _assess(state, c.measurement, c.dynamics, c.params, since)
     if clock.braking != 0 and reason == UNTRUE:
         reason, clock.at_rest = 0, 0  # whatever is measured now is where the arm is
     if reason == 0:
-        _accept(c, since, timed)
+        _accept(state, c.measurement, c.params.clock.dt, since, timed)
     else:
-        predict(c, usual * c.params.clock.dt)
+        net = net_torque(state, c.dynamics, c.params.observer, stack_vector(state.arm.q.shape[0]))
+        predict(state.arm, net, c.dynamics.M_inv, usual * c.params.clock.dt, c.params.arm)
         clock.elapsed, clock.since = usual, clock.since + usual
         clock.bridged += 1
     overdue = reason == 0 and since > OVERDUE_TICKS
@@ -90,47 +89,49 @@ def receive(c: Record, usable: bool) -> None:
 
 
 @compiled
-def _assess(c: Record, ticks: float) -> tuple[int, float, bool]:
+def _assess(state: Record, m: Record, dynamics: Record, params: Record, ticks: float) -> tuple[int, float, bool]:
     """Tell what is wrong with the measurement, how many ticks passed since the last good one, whether a clock says so.
 
     Nothing is wrong: 0. No tick passed where it is the last one again by its time as well.
 
     Args:
-        c: `controller_dtype` record.
+        state: `state_dtype` record; only what its clock says of itself is changed.
+        m: `measurement_dtype` record.
+        dynamics: of the last tick.
+        params: `params_dtype` record.
         ticks: that passed if none came late.
     """
-    clock, m = c.state.clock, c.measurement
+    clock, dt = state.clock, params.clock.dt
     clock.unclear = 0
-    if c.state.started == 0:
+    if state.started == 0:
         return 0, 1.0, False
     unchanged, timed = is_unchanged(clock, m), m.has_time != 0 and clock.has_time != 0
-    if timed and unchanged and abs(m.time - clock.time) <= _SAME_TIME_TICKS * c.params.clock.dt:
+    if timed and unchanged and abs(m.time - clock.time) <= _SAME_TIME_TICKS * dt:
         return REPEATED, 0.0, True
     if timed:
-        told = _ticks_told(c)
-        timed = _is_believed(c.state, told)
+        told = _ticks_told(clock, m, dt)
+        timed = _is_believed(state, told)
         ticks = told if timed else ticks
     if unchanged and moves(m):
         return REPEATED, ticks, timed
     if ticks > OVERDUE_TICKS:
         return 0, ticks, timed
-    astray = furthest_astray(c, ticks)
+    astray = furthest_astray(clock, m, ticks * dt)
     if astray > SLACK_RAD:
-        late = 0.0 if timed else ticks_from_motion(c, ticks)
+        late = 0.0 if timed else ticks_from_motion(state, m, dynamics, params, ticks)
         if late > 0.0:
             return 0, late, False
-        if astray > UNTRUE_RAD * max(ticks, 1.0) or (not timed and out_of_reach(c)):
+        if astray > UNTRUE_RAD * max(ticks, 1.0) or (not timed and out_of_reach(clock, m, state.arm.q, dt)):
             return UNTRUE, ticks, timed
         clock.unclear = 1 if ticks > 1.5 and not timed else 0
         return 0, ticks, timed
-    return (UNTRUE if velocity_jumps(c, ticks) else 0), ticks, timed
+    return (UNTRUE if velocity_jumps(clock, m, dynamics.M, ticks * dt, dt) else 0), ticks, timed
 
 
 @compiled
-def _ticks_told(c: Record) -> float:
-    """Ticks since the last good measurement by its time and that of this one."""
-    clock = c.state.clock
-    return (c.measurement.time - clock.time) / c.params.clock.dt - clock.offset
+def _ticks_told(clock: Record, m: Record, dt: float) -> float:
+    """Return the ticks since the last good measurement by its time and that of this one."""
+    return (m.time - clock.time) / dt - clock.offset
 
 
 @compiled
@@ -148,23 +149,23 @@ def _is_believed(state: Record, told: float) -> bool:
 
 
 @compiled
-def _accept(c: Record, since: float, timed: bool) -> None:
+def _accept(state: Record, m: Record, dt: float, since: float, timed: bool) -> None:
     """Take the measurement over; `timed` where its clock told how many ticks passed.
 
     A clock that stands or stutters is counted on, one that was set anew goes on from there.
     """
-    state, clock, arm, m = c.state, c.state.clock, c.state.arm, c.measurement
+    clock, arm = state.clock, state.arm
     if state.started == 0:
         clock.pace, clock.pace_variance = 1.0, PACE_UNKNOWN
     elif timed:
         clock.pace += 0.1 * (min(since / (clock.bridged + 1.0), clock.pace + 1.0) - clock.pace)
     elif clock.bridged == 0:
-        learn_pace(c)
+        learn_pace(clock, m, dt)
     clock.elapsed = min(max(since - clock.since, 0.0), BRIDGE_TICKS + 1.0)
     if clock.bridged > 0 or since > OVERDUE_TICKS:
         clock.at_rest = 0  # a brake that holds a place that was predicted lets go of it
     disbelieved = not timed and m.has_time != 0 and clock.has_time != 0
-    told = _ticks_told(c) if disbelieved else since
+    told = _ticks_told(clock, m, dt) if disbelieved else since
     clock.offset = since - told if abs(told) <= OVERDUE_TICKS else 0.0
     clock.since, clock.bridged = since, 0
     arm.q[:], arm.qd[:] = m.q, m.qd

@@ -18,14 +18,14 @@ _SHAKES = 0.25
 
 
 @compiled
-def ticks_from_motion(c: Record, ticks: float) -> float:
+def ticks_from_motion(state: Record, m: Record, dynamics: Record, params: Record, ticks: float) -> float:
     """Find how many ticks passed, where no clock says it, from how far the joints went; 0 where that explains nothing.
 
     The least-squares N of Δq = N dt q̇ over all joints. It must leave every joint where its velocities allow, but for a
     fraction of that, and must not contradict what the command did to them: filtered velocity looks like a late tick.
     More ticks than can be bridged are not believed at once: a wrong reading of the one joint that moves looks so too.
     """
-    clock, m, dt = c.state.clock, c.measurement, c.params.clock.dt
+    clock, dt = state.clock, params.clock.dt
     n = m.q.shape[0]
     along, squares, longest = 0.0, 0.0, 0.0
     for i in range(n):
@@ -34,24 +34,23 @@ def ticks_from_motion(c: Record, ticks: float) -> float:
         along += (m.q[i] - clock.q_good[i]) * mean
         squares += mean * mean
     found = along / (squares * dt) if squares > 0.0 else 0.0
-    if not ticks + 0.5 <= found <= OVERDUE_TICKS or furthest_astray(c, found) > SLACK_RAD + _SWAY * longest:
+    if not ticks + 0.5 <= found <= OVERDUE_TICKS or furthest_astray(clock, m, found * dt) > SLACK_RAD + _SWAY * longest:
         return 0.0
-    change, net = stack_vector(n), net_torque(c, stack_vector(n))
+    change, net = stack_vector(n), net_torque(state, dynamics, params.observer, stack_vector(n))
     for i in range(n):
         change[i] = m.qd[i] - clock.qd_good[i]
-    gained = dot(net, matvec_into(c.dynamics.M, change, stack_vector(n))) / dt
+    gained = dot(net, matvec_into(dynamics.M, change, stack_vector(n))) / dt
     size = dot(net, net)
     return found if size < 1.0 or 2.0 * gained >= (found + ticks) * size else 0.0
 
 
 @compiled
-def learn_pace(c: Record) -> None:
+def learn_pace(clock: Record, m: Record, dt: float) -> None:
     """Learn how many ticks of time a call comes to where no clock says it, from how far the joints go: Kalman's filter.
 
     A moving arm tells it precisely, one at rest not at all, and one whose velocity changes as much as it moves little:
     what lies between two velocities is not known. A single late tick is none of it, many are.
     """
-    clock, m, dt = c.state.clock, c.measurement, c.params.clock.dt
     along, squares, uncertain = 0.0, 0.0, _PACE_RAD2
     for i in range(m.q.shape[0]):
         mean, change = 0.5 * dt * (clock.qd_good[i] + m.qd[i]), 0.5 * dt * (m.qd[i] - clock.qd_good[i])

@@ -79,24 +79,30 @@ payload_dtype = np.dtype(
 
 
 @compiled
-def take_off_payload(c: Record) -> None:
+def take_off_payload(
+    payload: Record, arm: Record, known: Record, dynamics: Record, gravity: Vector, seconds: float, started: int
+) -> None:
     """Take the known payload's weight and inertial force off a measured wrench that has them in it.
 
     The wrench of the environment is what the sensor shows less (m γ − ṗ, r × m γ − L̇ − v × p), with the payload's
     momentum p and L about the tool point, r from there to its centre, v the tool point's velocity. The rates are
     differences between two measurements, as the observer's is: what one of them errs, the other does.
+
+    Args:
+        payload: `payload_dtype` record; its momentum is advanced.
+        arm: `arm_state_dtype` record; its wrench is changed.
+        known: `known_payload_dtype` record.
+        dynamics: of now.
+        gravity: (3,), m/s².
+        seconds, started: since the last good measurement; 0 where there is none.
     """
-    arm, known, payload = c.state.arm, c.payload, c.state.payload
-    if known.in_wrench == 0 or c.state.clock.bridged > 0:
-        return
     momentum, weight, turning = stack_vector(6), stack_vector(6), stack_vector(3)
-    payload_weight_into(known, c.dynamics.rotation, c.handle.gravity, weight)
-    payload_momentum_into(known, c.dynamics, momentum)
+    payload_weight_into(known, dynamics.rotation, gravity, weight)
+    payload_momentum_into(known, dynamics, momentum)
     if arm.has_wrench != 0:
-        cross_into(c.dynamics.velocity[:3], momentum[:3], turning)
-        seconds = max(c.state.clock.since, 1.0) * c.params.clock.dt
+        cross_into(dynamics.velocity[:3], momentum[:3], turning)
         for k in range(6):
-            rate = (momentum[k] - payload.momentum[k]) / seconds if c.state.started != 0 else 0.0
+            rate = (momentum[k] - payload.momentum[k]) / seconds if started != 0 else 0.0
             arm.wrench_ee[k] += rate - weight[k]
         arm.wrench_ee[3:] += turning
     payload.momentum[:] = momentum
@@ -143,9 +149,9 @@ def _prior(k: int) -> float:
 
 
 @compiled
-def load_regressor_into(c: Record, i: int, row: Vector) -> Vector:
+def load_regressor_into(dynamics: Record, gravity: Vector, i: int, row: Vector) -> Vector:
     """Fill the gravity torque at joint i of a load per its mass and mass times centre, (4,), m² / s² and m / s²."""
-    J, R, gravity = c.dynamics.J, c.dynamics.rotation, c.handle.gravity
+    J, R = dynamics.J, dynamics.rotation
     axis, arm = stack_vector(3), stack_vector(3)
     row[0] = 0.0
     for k in range(3):
@@ -157,36 +163,34 @@ def load_regressor_into(c: Record, i: int, row: Vector) -> Vector:
 
 
 @compiled
-def identify_payload(c: Record) -> bool:
-    """Identify what the tool carries beyond the model from one joint's torque, while the arm is slow; one joint a tick.
-
-    The torque is all that acts from outside, also on the tool: the sum of what the sensor shows and the observer finds.
-
-    Returns:
-        Whether a load that nobody told of keeps the tool from its target.
-    """
-    state, payload, dt = c.state, c.state.payload, c.state.step.dt
-    payload.slow_s = payload.slow_s + dt if _is_slow(state.arm.qd) else 0.0
+def is_settled(payload: Record, qd: Vector, dt: float) -> bool:
+    """Tell whether the arm has been slow for long enough to identify what it carries; else begin to wait anew."""
+    payload.slow_s = payload.slow_s + dt if _is_slow(qd) else 0.0
     if payload.slow_s < _SETTLE_S:
         payload.is_load, payload.sags_s = 0, 0.0
         return False
-    i = state.turn
-    row = load_regressor_into(c, i, stack_vector(4))
-    error = NOISE_NM + state.detection.model_uncertainty[i]
-    error += 0.5 * c.params.arm.friction[i, 0]  # at rest dry friction takes any part of itself
-    _identify_load(payload, row, _external_torque(c, i), error, dt)
-    payload.is_load = 1 if _is_load(payload, c.payload.mass) else 0
-    return _sags(c)
+    return True
 
 
 @compiled
-def _external_torque(c: Record, i: int) -> float:
-    """Return what acts on joint i from outside, N m, gravity that was identified included."""
-    state = c.state
-    torque = state.observer.residual[i] - state.link_masses.gravity_correction[i]
-    if state.arm.has_wrench != 0 and c.params.observer.cancel_tool_wrench != 0:
-        torque += dot(c.dynamics.J[:, i], state.arm.wrench_ee)
-    return torque
+def identify_payload(
+    payload: Record, row: Vector, torque: float, uncertainty: float, dry_friction: float, dt: float, known_kg: float
+) -> None:
+    """Identify what the tool carries beyond the model from the torque of one joint, while the arm is slow.
+
+    Args:
+        payload: `payload_dtype` record; advanced.
+        row: what `load_regressor_into` gives for the joint, (4,).
+        torque: all that acts on it from outside, also on the tool, N m.
+        uncertainty: of the model's torque there, N m.
+        dry_friction: of the joint; at rest it takes any part of itself, N m.
+        dt: that passed, s.
+        known_kg: mass of the known payload.
+    """
+    error = NOISE_NM + uncertainty
+    error += 0.5 * dry_friction
+    _identify_load(payload, row, torque, error, dt)
+    payload.is_load = 1 if _is_load(payload, known_kg) else 0
 
 
 @compiled
@@ -222,17 +226,24 @@ def _is_load(payload: Record, known_kg: float) -> bool:
 
 
 @compiled
-def _sags(c: Record) -> bool:
+def load_sags(payload: Record, error: Vector, velocity: Vector, gravity: Vector, known_kg: float, dt: float) -> bool:
     """Tell whether a load that nobody told of keeps the tool below its target, or lets it sink, for long.
 
     Or above, where what the tool is said to carry is not there.
+
+    Args:
+        payload: `payload_dtype` record; its time is advanced.
+        error: of the tool, target less position, (6,), m and rad.
+        velocity: of the tool, (6,), m/s and rad/s.
+        gravity: (3,), m/s².
+        known_kg: mass of the known payload.
+        dt: that passed, s.
     """
-    payload, error, gravity = c.state.payload, c.output.error, c.handle.gravity
     size = math.sqrt(dot(error[:3], error[:3]))
     side = 1.0 if payload.load[0] > 0.0 else -1.0
     down = side * max(math.sqrt(dot(gravity, gravity)), 1e-9)
-    against, sinking = -dot(error[:3], gravity) / down, dot(c.dynamics.velocity[:3], gravity) / down
-    much = payload.load[0] > 0.0 or -payload.load[0] > _LOST * c.payload.mass
+    against, sinking = -dot(error[:3], gravity) / down, dot(velocity[:3], gravity) / down
+    much = payload.load[0] > 0.0 or -payload.load[0] > _LOST * known_kg
     sags = payload.is_load != 0 and much and size > _SAGS_M and against > 0.5 * size and sinking > -_RISES_M_S
-    payload.sags_s = payload.sags_s + c.state.step.dt if sags else 0.0
+    payload.sags_s = payload.sags_s + dt if sags else 0.0
     return payload.sags_s > _SAGS_S

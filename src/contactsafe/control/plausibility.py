@@ -6,7 +6,7 @@ derives the bounds.
 
 import math
 
-from contactsafe.core.arrays import Record, Vector
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 
 BRIDGE_TICKS = 20
@@ -31,18 +31,22 @@ _STUCK_RAD = 2e-5
 
 
 @compiled
-def is_usable(c: Record) -> bool:
-    """Tell whether every number of the measurement is one that this arm can have.
+def is_usable(m: Record, arm: Record, braking: int) -> bool:
+    """Tell whether every number of a measurement is one that this arm can have.
 
     A broken force sensor stops the arm, but it is braked by its joints, which are still seen.
+
+    Args:
+        m: `measurement_dtype` record.
+        arm: `arm_dtype` record.
+        braking: whether the arm is braked.
     """
-    m, arm = c.measurement, c.params.arm
     for i in range(m.q.shape[0]):
         if not (arm.q_least[i] <= m.q[i] <= arm.q_most[i] and abs(m.qd[i]) <= arm.qd_most[i]):
             return False
     if m.has_time != 0 and not math.isfinite(m.time):
         return False
-    return m.has_wrench == 0 or c.state.clock.braking != 0 or all_usable(m.wrench_ee)
+    return m.has_wrench == 0 or braking != 0 or all_usable(m.wrench_ee)
 
 
 @compiled
@@ -73,10 +77,9 @@ def moves(m: Record) -> bool:
 
 
 @compiled
-def furthest_astray(c: Record, ticks: float) -> float:
-    """Largest distance of a joint from where its two velocities, before and now, allow it to be, rad."""
-    clock, m = c.state.clock, c.measurement
-    time, most = ticks * c.params.clock.dt, 0.0
+def furthest_astray(clock: Record, m: Record, time: float) -> float:
+    """Return the largest distance of a joint from where its two velocities, before and now, allow it to be, rad."""
+    most = 0.0
     for i in range(m.q.shape[0]):
         moved, before, now = m.q[i] - clock.q_good[i], clock.qd_good[i], m.qd[i]
         most = max(most, moved - time * max(before, now), time * min(before, now) - moved)
@@ -84,24 +87,21 @@ def furthest_astray(c: Record, ticks: float) -> float:
 
 
 @compiled
-def out_of_reach(c: Record) -> bool:
-    """Tell whether a joint is further from where it is believed to be than any joint goes in the ticks bridged."""
-    clock, m = c.state.clock, c.measurement
+def out_of_reach(clock: Record, m: Record, q: Vector, dt: float) -> bool:
+    """Tell whether a joint is further from where it is believed to be, q, than any goes in the ticks bridged."""
     fastest, furthest = 0.0, 0.0
     for i in range(m.q.shape[0]):
         fastest = max(fastest, abs(m.qd[i]), abs(clock.qd_good[i]))
-        furthest = max(furthest, abs(m.q[i] - c.state.arm.q[i]))
-    return furthest > UNTRUE_RAD + OVERDUE_TICKS * c.params.clock.dt * fastest
+        furthest = max(furthest, abs(m.q[i] - q[i]))
+    return furthest > UNTRUE_RAD + OVERDUE_TICKS * dt * fastest
 
 
 @compiled
-def velocity_jumps(c: Record, ticks: float) -> bool:
+def velocity_jumps(clock: Record, m: Record, M: Matrix, time: float, dt: float) -> bool:
     """Tell whether a joint's velocity changed as nothing but a large torque changes it, and its position denies it."""
-    clock, m, M = c.state.clock, c.measurement, c.dynamics.M
-    time = ticks * c.params.clock.dt
     for i in range(m.q.shape[0]):
         jump = m.qd[i] - clock.qd_good[i]
-        if abs(jump) * M[i, i] > _JUMP_NM * max(time, c.params.clock.dt):
+        if abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
             shown = (m.q[i] - clock.q_good[i]) / time - clock.qd_good[i]
             if shown * jump < 0.25 * jump * jump:
                 return True

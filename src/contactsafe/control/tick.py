@@ -32,7 +32,14 @@ from contactsafe.control.laws import contact_nullspace, task_error, task_inertia
 from contactsafe.control.limits import fill_tank, limit_command, limit_torque, runs_away
 from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
 from contactsafe.control.observer import observe, start_observer
-from contactsafe.control.payload import identify_payload, reset_payload, take_off_payload
+from contactsafe.control.payload import (
+    identify_payload,
+    is_settled,
+    load_regressor_into,
+    load_sags,
+    reset_payload,
+    take_off_payload,
+)
 from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.stopping import stop_late_target, stop_torque
 from contactsafe.control.supervision import supervise
@@ -40,7 +47,7 @@ from contactsafe.control.target import accept_target
 from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import matmul
+from contactsafe.core.linalg import dot, matmul
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
 
@@ -51,7 +58,8 @@ def control_tick(c: Record) -> None:
 
     Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
     """
-    state, dynamics, usable = c.state, c.dynamics, is_usable(c)
+    state, dynamics = c.state, c.dynamics
+    usable = is_usable(c.measurement, c.params.arm, state.clock.braking)
     if not usable:
         latch(state, BAD_MEASUREMENT)
         if state.started == 0:
@@ -60,12 +68,14 @@ def control_tick(c: Record) -> None:
     receive(c, usable)
     latch(state, accept_target(state.target, c.target, c.params.impedance))
     update_dynamics(c.handle, state.arm.q, state.arm.qd, dynamics)
-    take_off_payload(c)
+    if c.payload.in_wrench != 0 and state.clock.bridged == 0:
+        seconds = max(state.clock.since, 1.0) * c.params.clock.dt
+        take_off_payload(state.payload, state.arm, c.payload, dynamics, c.handle.gravity, seconds, state.started)
     mass_variance = c.params.identification.mass_variance
     correct_gravity(state.link_masses, dynamics, c.handle, state.arm.has_wrench, mass_variance)
     if state.started == 0:
         _start(c)
-    stop_late_target(c)
+    stop_late_target(state.clock, state.target, c.target.kept, state.arm, dynamics, c.params.clock)
     known = c.params.impedance
     Lambda, J_M_inv = task_inertia(dynamics.J, dynamics.M_inv, known.manipulability_floor, known.manipulability_damping)
     J_bar = matmul(J_M_inv.T, Lambda)
@@ -73,7 +83,7 @@ def control_tick(c: Record) -> None:
     set_step(state.step, c.params.one_tick, state.clock.elapsed)
     tau = _law(c, Lambda, J_bar)
     if state.clock.braking != 0:
-        tau = stop_torque(c)
+        tau = stop_torque(state.clock, state.arm, dynamics.M)
     _send(c, tau)
 
 
@@ -137,6 +147,9 @@ def _estimate(c: Record, J_bar: Matrix) -> None:
         separate_tool_wrench(tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, params.identification)
     supervise(c)
     _identify(c)
+    if _has_unknown_load(c) and state.clock.braking == 0 and state.limits.runaway == 0:
+        state.fault = LOAD  # it takes the place of faults that are over
+    state.turn = (state.turn + 1) % state.arm.q.shape[0]
     if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
         state.fault, state.limits.runaway = RUNAWAY, 1
     state.clock.since = 0.0
@@ -144,16 +157,29 @@ def _estimate(c: Record, J_bar: Matrix) -> None:
 
 @inlined
 def _identify(c: Record) -> None:
-    """Identify link masses and payload, one joint a tick in turn."""
+    """Identify link masses from one joint's residual, while nothing touches the arm."""
     state, params, observer, dynamics = c.state, c.params, c.state.observer, c.dynamics
     i, untouched = state.turn, state.mode == FREE and state.detection.quiet_ticks > 0
     identify_link_masses(
         state.link_masses, i, observer.residual[i], state.detection.model_uncertainty[i], dynamics.mass_regressor[i],
         state.step.dt, untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
     )  # fmt: skip
-    if identify_payload(c) and state.clock.braking == 0 and state.limits.runaway == 0:
-        state.fault = LOAD  # it takes the place of faults that are over
-    state.turn = (i + 1) % state.arm.q.shape[0]
+
+
+@inlined
+def _has_unknown_load(c: Record) -> bool:
+    """Identify the payload from one joint's torque, all that acts from outside; tell whether it keeps the tool away."""
+    state, dynamics, gravity, dt, i = c.state, c.dynamics, c.handle.gravity, c.state.step.dt, c.state.turn
+    payload, known_kg = state.payload, c.payload.mass
+    if not is_settled(payload, state.arm.qd, dt):
+        return False
+    torque = state.observer.residual[i] - state.link_masses.gravity_correction[i]
+    if state.arm.has_wrench != 0 and c.params.observer.cancel_tool_wrench != 0:
+        torque += dot(dynamics.J[:, i], state.arm.wrench_ee)
+    row = load_regressor_into(dynamics, gravity, i, stack_vector(4))
+    uncertainty, dry_friction = state.detection.model_uncertainty[i], c.params.arm.friction[i, 0]
+    identify_payload(payload, row, torque, uncertainty, dry_friction, dt, known_kg)
+    return load_sags(payload, c.output.error, dynamics.velocity, gravity, known_kg, dt)
 
 
 @inlined
