@@ -117,7 +117,7 @@ def run_all(scenes: int, path: str) -> None:
     from contactsafe.robot.mjcf import arm_mjcf
 
     arm = cs.robots.panda()
-    description = getattr(arm, "description", None) or arm.description  # named so before
+    description = getattr(arm, "description", None) or arm.facts  # named so before
     arm_xml = arm_mjcf(description, arm.tool)
     np.save(path, np.array([run_scene(index, cs, arm, arm_xml) for index in range(scenes)]))
 

@@ -1,23 +1,43 @@
 """Tables of the page on control, written from the code at every build, so that they cannot go stale."""
 
-import re
-from dataclasses import fields
+from collections.abc import Iterator
+from dataclasses import Field, fields
 
-from contactsafe import ControllerConfig, presets
-from contactsafe.control.records import FAULTS
+from contactsafe import presets
+from contactsafe.control.codes import FAULTS
+from contactsafe.control.config import STAGES
+from contactsafe.control.parameter import allowed, declaration
+
+NAMES = ("vices", "paper", "safe")
 
 
 def parameters() -> str:
-    """Every parameter with its meaning and its value in each preset; what differs from `paper` stands in bold."""
-    configs = {name: presets.by_name(name) for name in ("vices", "paper", "safe")}
-    meanings = _attributes(ControllerConfig.__doc__ or "")
-    lines = ["| parameter | meaning | " + " | ".join(f"`{name}()`" for name in configs) + " |", "|---" * 5 + "|"]
-    for field in fields(ControllerConfig):
-        paper = getattr(configs["paper"], field.name)
-        values = [getattr(config, field.name) for config in configs.values()]
-        cells = [_text(value) if value == paper else f"**{_text(value)}**" for value in values]
-        lines.append(f"| `{field.name}` | {meanings[field.name]} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    """Every parameter by stage: unit, bounds, meaning and value in each preset; what differs from `paper` in bold."""
+    header = "| parameter | unit | allowed | meaning | " + " | ".join(f"`{name}()`" for name in NAMES) + " |"
+    return "\n".join([header, "|---" * 7 + "|", *_rows()])
+
+
+def _rows() -> Iterator[str]:
+    for stage, kind in STAGES.items():
+        yield f"| **{stage}** | | | {(kind.__doc__ or '').split(chr(10))[0].rstrip('.')} | | | |"
+        for field in fields(kind):
+            known = declaration(field)
+            yield (
+                " | ".join([f"| `{field.name}`", known.unit, allowed(field), known.doc, *_values(stage, field)]) + " |"
+            )
+
+
+def _values(stage: str, field: Field) -> Iterator[str]:
+    paper = getattr(getattr(presets.paper(), stage), field.name)
+    for name in NAMES:
+        value = getattr(getattr(presets.by_name(name), stage), field.name)
+        yield _text(value) if value == paper else f"**{_text(value)}**"
+
+
+def reasons() -> str:
+    """Why each value of `safe()` is not the one of `paper()`."""
+    rows = (f"| `{name}` | {_text(value)} | {reason} |" for name, (value, reason) in presets.SAFE.items())
+    return "\n".join(["| parameter | `safe()` | because |", "|---|---|---|", *rows])
 
 
 def faults() -> str:
@@ -29,7 +49,9 @@ def faults() -> str:
 
 def fill(text: str) -> str:
     """Put the tables where the page asks for them."""
-    return text.replace("<!-- table: parameters -->", parameters()).replace("<!-- table: faults -->", faults())
+    for name, table in (("parameters", parameters), ("reasons", reasons), ("faults", faults)):
+        text = text.replace(f"<!-- table: {name} -->", table())
+    return text
 
 
 def _text(value) -> str:
@@ -38,10 +60,3 @@ def _text(value) -> str:
     if isinstance(value, tuple):
         return ", ".join(f"{number:g}" for number in value)
     return f"{value:g}".replace("inf", "∞")
-
-
-def _attributes(docstring: str) -> dict[str, str]:
-    """Read the Attributes section: name, then its meaning, perhaps over several lines."""
-    section = docstring.split("Attributes:\n", 1)[1]
-    found = re.findall(r"^ {8}(\w+): (.*(?:\n {12}.*)*)", section, re.MULTILINE)
-    return {name: re.sub(r"\s+", " ", meaning).strip() for name, meaning in found}

@@ -16,7 +16,14 @@ import mujoco
 import numpy as np
 
 import contactsafe as cs
-from contactsafe.control.laws import contact_nullspace, push_along, stiffness_wrench, task_inertia, task_nullspace
+from contactsafe.control.codes import FREE, REJECT
+from contactsafe.control.laws import (
+    contact_nullspace,
+    stiffness_wrench,
+    task_inertia,
+    task_nullspace,
+    torque_against_contact,
+)
 from contactsafe.experiments.adversarial import run_adversarial
 from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
 from contactsafe.experiments.collisions import run_battery
@@ -40,8 +47,8 @@ UNTOUCHED = np.zeros(6)
 """What a force sensor says while nothing touches the tool."""
 
 PAPER, VICES, SAFE = cs.presets.paper(), cs.presets.vices(), cs.presets.safe()
-FAST = replace(
-    PAPER, observer_gain=50.0, detection_gain=50.0, residual_threshold=2.0, null_damping=3.0, contact_damping=2.0
+FAST = PAPER.with_(
+    compensation_gain=50.0, detection_gain=50.0, residual_threshold=2.0, null_damping=3.0, contact_damping=2.0
 )
 """The paper's law with a fast observer and damping where (21) leaves none; nothing bounds its push."""
 
@@ -76,7 +83,7 @@ def postures(count: int) -> list[np.ndarray]:
     for seed in itertools.count():
         q = sample_motion(ARM, seed).q_start
         m = model_at(q)
-        if np.linalg.det(m.J @ m.M_inv @ m.J.T) > PAPER.manipulability_floor:
+        if np.linalg.det(m.J @ m.M_inv @ m.J.T) > PAPER.impedance.manipulability_floor:
             found.append(q)
         if len(found) == count:
             break
@@ -132,7 +139,7 @@ class Loop:
         self.data.qpos[:] = q
         self.wrench_ee = wrench_ee
         mujoco.mj_forward(self.model, self.data)
-        self.controller = cs.Controller(arm, replace(config, friction_compensation=False))
+        self.controller = cs.Controller(arm, config.with_(friction_compensation=False))
         self.controller.reset(q)
         self.target = cs.Target(arm.tool_pose(q), STIFFNESS, posture=q)
 
@@ -140,7 +147,7 @@ class Loop:
         """Run one millisecond; `torque` may change what is sent."""
         out = self.controller.step(cs.Measurement(self.data.qpos, self.data.qvel, self.wrench_ee), self.target)
         sent = torque(out)
-        self.controller.record["state"]["tau"] = sent  # the observer has to know
+        self.controller.record["state"]["command"]["tau"] = sent  # the observer has to know
         self.data.ctrl[:] = sent
         mujoco.mj_step(self.model, self.data)
         return out
@@ -207,7 +214,7 @@ def shares(values: Sequence[float], unit: str) -> str:
 
 def sign_of_the_external_torque() -> None:
     """With (2) as printed the observer would report the negative of what pushes the arm."""
-    loop = Loop(replace(VICES, observer_gain=50.0))
+    loop = Loop(VICES.with_(compensation_gain=50.0))
     loop.push("link5", (0.0, 20.0, 0.0))
     for _ in range(300):
         out = loop.tick()
@@ -250,11 +257,11 @@ def projector_is_zero() -> None:
         rank.append(np.linalg.matrix_rank(m.N_t, tol=1e-6))
     say(f"100 postures and contacts: rank of N_t at most {max(rank)}, |N_ct| / |N_t| at most {max(left):.0e}")
     pushes = [push for push in lasting_pushes() if push[0] == 5]
-    quick = replace(PAPER, observer_gain=50.0, detection_gain=50.0)
+    quick = PAPER.with_(compensation_gain=50.0, detection_gain=50.0)
     for name, config in {
         "vices": VICES,
         "paper, K_I 50 1/s": quick,
-        "the same, null_damping 3": replace(quick, null_damping=3.0),
+        "the same, null_damping 3": quick.with_(null_damping=3.0),
         "safe": SAFE,
     }.items():
         traces = hold(config, 1.2, pushes)
@@ -264,10 +271,10 @@ def projector_is_zero() -> None:
 
 def slow_observer() -> None:
     """K_I = 1.5 1/s finds a contact late; two filters of one observer serve triggering and compensation apart."""
-    for gain in (PAPER.detection_gain, 15.0, 50.0, SAFE.detection_gain):
+    for gain in (PAPER.observer.detection_gain, 15.0, 50.0, SAFE.observer.detection_gain):
         found = []
         for step_nm in (3.0, 5.0, 10.0):
-            loop = Loop(replace(VICES, detection_gain=gain, residual_cutoff_hz=math.inf))
+            loop = Loop(VICES.with_(detection_gain=gain, residual_cutoff_hz=math.inf))
             loop.data.qfrc_applied[0] = step_nm
             ticks = next((k for k in range(1000) if loop.tick().contact.link), math.inf)
             found.append(f"{ticks:.0f}")
@@ -276,14 +283,14 @@ def slow_observer() -> None:
 
 def printed_law_can_hurt() -> None:
     """The compensation cancels the reaction that would have stopped the arm: peaks above those of no law at all."""
-    laws = {"vices": VICES, "paper": PAPER, "paper, K_I 15": replace(PAPER, observer_gain=15.0, detection_gain=15.0)}
+    laws = {"vices": VICES, "paper": PAPER, "paper, K_I 15": PAPER.with_(compensation_gain=15.0, detection_gain=15.0)}
     _battery(laws, 48)
 
 
 def bounded_push() -> None:
     """Bounding what the command pushes along the contact mends that."""
-    bounded = replace(PAPER, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0, null_damping=3.0)
-    quick = replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0)
+    bounded = PAPER.with_(contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0, null_damping=3.0)
+    quick = FAST.with_(contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0)
     _battery({"vices": VICES, "paper, 3 N m": bounded, "fast, 3 N m": quick, "safe": SAFE}, 48)
 
 
@@ -301,10 +308,10 @@ def _battery(laws: dict[str, cs.ControllerConfig], trials: int) -> None:
 
 def yield_or_hold() -> None:
     """One bound for all contacts either presses obstacles or lets pushers carry the arm away."""
-    free = replace(FAST, contact_torque_limit_comply_nm=math.inf, contact_torque_limit_reject_nm=math.inf)
+    free = FAST.with_(contact_torque_limit_comply_nm=math.inf, contact_torque_limit_reject_nm=math.inf)
     laws = {
         "no bound": free,
-        "3 N m always": replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
+        "3 N m always": FAST.with_(contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
         "safe": SAFE,
     }
     battery = run_battery(laws, range(16), ["clean"])
@@ -395,9 +402,9 @@ class _ForceAdded(Worlds):
     def run(self, ticks, trace: np.ndarray | None = None) -> None:
         """Run tick by tick, and bound each command."""
         one = np.zeros((self.n, 1), dtype=trace_dtype(self.arm.n))
-        self.controllers["params"]["torque_step"] = np.inf
+        self.controllers["params"]["one_tick"]["torque_step"] = np.inf
         for k in range(int(np.max(ticks))):
-            before = self.controllers["state"]["tau"].copy()
+            before = self.controllers["state"]["command"]["tau"].copy()
             super().run(1, one)
             if trace is not None:
                 trace[:, k] = one[:, 0]
@@ -406,13 +413,14 @@ class _ForceAdded(Worlds):
 
     def _bound(self, i: int, before: np.ndarray) -> None:
         now, state = self.controllers[i]["dynamics"], self.controllers[i]["state"]
-        tau, step = state["tau"].copy(), self.arm.torque_rate_max / 1000.0
-        if self.controllers[i]["output"]["mode"] == 1:
-            net = tau - now["c"] - now["g"] - state["friction"]
-            over = push_along(state["direction"].copy(), now["M_inv"].copy(), net) - self.bound_nm
-            tau += max(over, 0.0) * state["direction"]
+        command, direction = state["command"], state["isolation"]["direction"]
+        tau, step = command["tau"].copy(), self.arm.torque_rate_max / 1000.0
+        if self.controllers[i]["output"]["mode"] != FREE:
+            net = tau - now["c"] - now["g"] - command["friction"]
+            over = torque_against_contact(direction.copy(), now["M_inv"].copy(), net) - self.bound_nm
+            tau += max(over, 0.0) * direction
         tau = np.clip(np.clip(tau, before - step, before + step), -self.arm.tau_max, self.arm.tau_max)
-        state["tau"] = self.records[i]["errors"]["tau_delayed"] = tau
+        command["tau"] = self.records[i]["errors"]["tau_delayed"] = tau
 
 
 def force_added_drags_the_arm() -> None:
@@ -424,7 +432,7 @@ def force_added_drags_the_arm() -> None:
         "no bound": scenes.run(FAST, worlds),
         "3 N m by adding": scenes.run(FAST, worlds, _ForceAdded),
         "3 N m by yielding": scenes.run(
-            replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0), worlds
+            FAST.with_(contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0), worlds
         ),
         "safe": scenes.run(SAFE, worlds),
     }
@@ -470,10 +478,10 @@ def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarr
 
 def _verdicts(trace: np.ndarray) -> tuple[bool, bool, bool]:
     """Tell whether a contact was found, whether its work in the next 50 ms says pusher, and the controller in 0.5 s."""
-    found = (trace["mode"] == 1) & (np.abs(trace["tau_arm"]).max(axis=1) > 0.3)
+    found = (trace["mode"] != FREE) & (np.abs(trace["tau_arm"]).max(axis=1) > 0.3)
     first = int(np.argmax(found))
     work = np.einsum("ti,ti->t", trace["residual_fast"][:-1], np.diff(trace["q"], axis=0))
-    pushes = bool(work[first : first + 50].sum() > 0), bool(trace["holding"][first : first + 500][-1])
+    pushes = bool(work[first : first + 50].sum() > 0), bool(trace["mode"][first : first + 500][-1] == REJECT)
     return (True, *pushes) if found.any() else (False, False, False)
 
 
@@ -482,7 +490,7 @@ def stiff_pusher_that_stays() -> None:
     laws = {
         "vices": VICES,
         "no bound": FAST,
-        "3 N m always": replace(FAST, contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
+        "3 N m always": FAST.with_(contact_torque_limit_comply_nm=3.0, contact_torque_limit_reject_nm=3.0),
     }
     things = {"front": _driven_into_the_forearm((-1.0, 0.0, 0.0)), "side": _driven_into_the_forearm((0.0, 1.0, 0.0))}
     for name, config in {**laws, "safe": SAFE}.items():
@@ -520,7 +528,7 @@ def naming_the_link() -> None:
             push = sample_push(ARM, q, rng, CONTACT)
             torque = 10.0 * push.torque / np.linalg.norm(push.force)
             own.append(abs(torque[push.link - 1]))
-            over = np.flatnonzero(np.abs(push.torque) > PAPER.residual_threshold)
+            over = np.flatnonzero(np.abs(push.torque) > PAPER.detection.residual_threshold)
             furthest.append(abs(push.link - (over[-1] + 1 if over.size else 0)))
             fit = unit @ torque / np.maximum(sizes, 1e-9)
             nearest.append(abs(push.link - surface[int(np.argmax(fit)), 0]))
@@ -543,7 +551,7 @@ def weight_of_the_links() -> None:
     off = np.median([np.abs(model_at(q, heavy).g - model_at(q).g) for q in postures(100)], axis=0)
     say(f"links 10 % heavier: {', '.join(f'{nm:.1f}' for nm in off)} N m at joints 1 to 7, median of 100 postures")
     strokes = sample_strokes(ARM, 0, 6)
-    laws = {"paper": PAPER, "safe, not weighing": replace(SAFE, mass_uncertainty=0.0), "safe": SAFE}
+    laws = {"paper": PAPER, "safe, not weighing": SAFE.with_(mass_uncertainty=0.0), "safe": SAFE}
     for name, config in laws.items():
         found = [trial.metrics for trial in false_alarm_trials(ARM, name, config, strokes)]
         alarms, lasted = sum(f["false_alarms"] for f in found), sum(f["false_contact_s"] for f in found)
@@ -584,28 +592,32 @@ def pull_and_energy() -> None:
     pulls = [
         np.linalg.norm(
             stiffness_wrench(
-                m.Lambda, error, np.full(6, 1500.0), c.task_acceleration_max_m_s2, c.task_acceleration_max_rad_s2
+                m.Lambda,
+                error,
+                np.full(6, 1500.0),
+                c.impedance.task_acceleration_max_m_s2,
+                c.impedance.task_acceleration_max_rad_s2,
             )[:3]
         )
         for c in (PAPER, SAFE)
     ]
     say(f"a target 10 m away, K1 1500 1/s²: pulled with {pulls[0]:.0f} N; bounded {pulls[1]:.0f} N")
-    tank = {"tank_j": SAFE.tank_j, "tank_power_w": SAFE.tank_power_w}
+    tank = {"tank_j": SAFE.limits.tank_j, "tank_power_w": SAFE.limits.tank_power_w}
     pull = {
         name: getattr(SAFE, name)
         for name in ("task_acceleration_max_m_s2", "task_acceleration_max_rad_s2", "posture_error_max_rad")
     }
-    laws = {"paper": PAPER, "+ tank": replace(PAPER, **tank), "+ bounded pull": replace(PAPER, **pull), "safe": SAFE}
+    laws = {"paper": PAPER, "+ tank": PAPER.with_(**tank), "+ bounded pull": PAPER.with_(**pull), "safe": SAFE}
     for name, config in laws.items():
         found = run_adversarial(ARM, config, range(8), 5000)
         given, beyond = (max(f[figure] for f in found) for figure in ("energy_given_j", "joint_range_beyond_mrad"))
         say(f"{name:14s} 8 adversarial runs of 5 s: at most {given:3.0f} J given away (a tank's bound: "
-            f"{SAFE.tank_j + 5 * SAFE.tank_power_w:.0f} J), {beyond:3.0f} mrad out of range")  # fmt: skip
+            f"{SAFE.limits.tank_j + 5 * SAFE.limits.tank_power_w:.0f} J), {beyond:3.0f} mrad out of range")  # fmt: skip
 
 
 def gains_that_pump() -> None:
     """Stiffness that rises on the way in and falls on the way out feeds the arm; bounding its rise stops that."""
-    for name, config in {"gains as asked": VICES, "gains rise passively": replace(VICES, passive_gains=True)}.items():
+    for name, config in {"gains as asked": VICES, "gains rise passively": VICES.with_(passive_gains=True)}.items():
         loop = Loop(config)
         goal, soft, stiff = loop.target, np.full(6, 40.0), np.full(6, 160.0)
         aside = goal.pose.position + np.array([0.0, 0.02, 0.0])

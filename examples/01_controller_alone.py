@@ -25,7 +25,7 @@ def main(seconds: float = 1.5) -> float:
         data.ctrl[:] = out.torque
         mujoco.mj_step(model, data)
         if tick in (299, 400):
-            print(f"{tick} ms: contact {out.contact.in_contact}, link {out.contact.link}, pushed {out.contact.holding}")
+            print(f"{tick} ms: contact {out.contact.in_contact}, link {out.contact.link}, kind {out.contact.kind}")
         largest = max(largest, float(np.linalg.norm(out.error[:3])))
     print(f"largest tool error: {1000 * largest:.1f} mm")
     return largest

@@ -83,7 +83,7 @@ def solve(ik):
 def drive(controller):
     """Swing about the home pose with a push: the residual, and so the torque, depends on all that was before."""
     arm, torques = controller.arm, []
-    start = int(controller.record["state"]["ticks"])
+    start = int(controller.record["state"]["link_masses"]["ticks"])
     target = cs.Target(arm.tool_pose(arm.home), np.full(6, 200.0))
     for k in range(start, start + 30):
         swing = 0.01 * np.sin(0.05 * k + np.arange(7))
@@ -483,7 +483,7 @@ def test_controllers_that_share_records_are_copied_with_them():
     expected = drive(pair[0]), drive(pair[1])
     assert_same(drive(first), expected[0])
     assert_same(drive(second), expected[1])
-    assert copied["state"]["ticks"].tolist() == [30, 30]
+    assert copied["state"]["link_masses"]["ticks"].tolist() == [30, 30]
 
 
 def test_what_a_user_hung_on_a_subclass_goes_along():

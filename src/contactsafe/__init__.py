@@ -7,7 +7,8 @@ from contactsafe.core import telemetry as _telemetry  # noqa: F401  before any d
 from contactsafe import tasks as _tasks  # noqa: F401  which Gymnasium then knows
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
-from contactsafe.control.controller import Contact, Controller, Measurement, Output, Target
+from contactsafe.control.controller import Controller
+from contactsafe.control.signals import Contact, Measurement, Output, Target
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose

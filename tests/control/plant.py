@@ -15,7 +15,7 @@ UNTOUCHED = np.zeros(6)
 
 
 class Plant:
-    """An arm without friction, noise or delay; xfrc_applied pushes it, and springs may stand in its way.
+    """An arm without friction, noise or delay; xfrc_applied pushes it, and springs may stand in its path.
 
     Args:
         arm: whose model is the plant, unless another is given.

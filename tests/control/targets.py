@@ -5,7 +5,7 @@ import numpy as np
 from contactsafe import Pose, Target
 
 
-def hostile_target(arm, rng):
+def fuzzed_target(arm, rng):
     """Draw a target that has nothing to do with where the arm is: pose, gains within their ranges, posture."""
     quat = rng.normal(size=4)
     pose = Pose(rng.uniform([0.2, -0.6, 0.0], [0.7, 0.6, 0.8]), quat / np.linalg.norm(quat))
@@ -18,9 +18,9 @@ def corner_target(arm, rng, stiffness, damping):
     return Target(arm.tool_pose(corner), np.full(6, stiffness), np.full(6, damping), corner)
 
 
-def harass(k, every, arm, plant, rng, target):
-    """Give the target in force at tick k, a new hostile one every so many ticks; push another link every 500."""
+def disturb(k, every, arm, plant, rng, target):
+    """Give the target in force at tick k, a new fuzzed one every so many ticks; push another link every 500."""
     if k % 500 == 0:
         plant.data.xfrc_applied[:] = 0.0
         plant.push(f"link{rng.integers(3, 8)}", rng.normal(size=3) * 15.0)
-    return hostile_target(arm, rng) if k % every == 0 else target
+    return fuzzed_target(arm, rng) if k % every == 0 else target

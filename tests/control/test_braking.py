@@ -56,8 +56,8 @@ def test_a_light_joint_is_braked_at_once(m):
 def test_it_takes_over_gradually_and_wholly_at_the_speed_limit():
     zero, one, most = np.zeros(2), np.ones(2), np.full(2, 10.0)
     qd = np.array([1.0, 0.0])
-    shares = [braking_fraction(v * qd, v * qd, zero, most, one) for v in (0.0, 7.9, 9.0, 10.0, 30.0)]
-    assert shares == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
+    fractions = [braking_fraction(v * qd, v * qd, zero, most, one) for v in (0.0, 7.9, 9.0, 10.0, 30.0)]
+    assert fractions == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
     assert braking_fraction(zero, -10.0 * qd, zero, most, one) == 1.0  # before it is so fast
     assert braking_fraction(zero, zero, 0.5 * one, most, one) == 1.0  # its own motion takes half the torque
     assert math.isclose(braking_fraction(zero, zero, 0.32 * one, most, one), 0.0, abs_tol=1e-12)

@@ -1,7 +1,5 @@
 """The laws on an arm that is exactly as modelled: what the equations promise is what it does."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -11,11 +9,11 @@ from contactsafe import Pose, Target, presets
 from contactsafe.control.laws import task_error
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 
-FREE = replace(presets.vices(), friction_compensation=False)
+FREE = presets.vices().with_(friction_compensation=False)
 
 
 def test_arm_at_rest_stays(panda):
-    """Gravity is carried whole, its null-space share included."""
+    """Gravity is carried whole, its null-space fraction included."""
     for preset in (presets.vices(), presets.paper(), presets.safe()):
         plant, controller = Plant(panda), controller_at(panda, preset)
         plant.run(controller, hold(panda), 1000)
@@ -23,7 +21,7 @@ def test_arm_at_rest_stays(panda):
 
 
 def test_null_space_gravity_is_carried_without_any_posture_task(panda):
-    config = replace(FREE, K_posture=(0.0,), D_posture=(0.0,))
+    config = FREE.with_(K_posture=(0.0,), D_posture=(0.0,))
     plant, controller = Plant(panda), controller_at(panda, config)
     plant.run(controller, hold(panda), 1000)
     assert_allclose(plant.q, panda.home, rtol=0, atol=1e-6)
@@ -72,7 +70,7 @@ def test_posture_task_moves_the_joints_and_not_the_tool(quick_panda):
 
 def test_contact_law_cancels_what_the_residual_shows_and_nothing_else(quick_panda):
     """(18): a push on a link accelerates the tool by J M⁻¹ (τ_ext − residual) beyond K e − D ẋ, at every tick."""
-    config = replace(presets.paper(), friction_compensation=False, observer_gain=50.0, detection_gain=50.0)
+    config = presets.paper().with_(friction_compensation=False, compensation_gain=50.0, detection_gain=50.0)
     plant, controller = Plant(quick_panda), controller_at(quick_panda, config)
     plant.push("link4", (0.0, 20.0, 0.0))
     still, K, D, in_contact = hold(quick_panda), 150.0, 2 * np.sqrt(150.0), 0
@@ -88,12 +86,12 @@ def test_contact_law_cancels_what_the_residual_shows_and_nothing_else(quick_pand
 
 
 def test_joint_driven_outwards_stops_inside_its_range(panda):
-    """The tool is asked to turn about its own axis, 0.3 rad ahead of where it is, until joint 7 has no more to give."""
+    """The tool is asked to turn about its own axis, 0.3 rad from where it is, until joint 7 has no more to give."""
     plant, controller = Plant(panda), controller_at(panda, FREE)
     home, highest = panda.tool_pose(panda.home), 0.0
     for k in range(400):
-        ahead = min(0.01 * k, plant.q[6] - panda.home[6] + 0.3)
-        quat = quat_multiply(home.quat, rotvec_to_quat(np.array([0.0, 0.0, ahead])))
+        offset = min(0.01 * k, plant.q[6] - panda.home[6] + 0.3)
+        quat = quat_multiply(home.quat, rotvec_to_quat(np.array([0.0, 0.0, offset])))
         plant.run(controller, Target(Pose(home.position, quat), STIFFNESS, posture=panda.home), 17)
         highest = max(highest, plant.q[6])
     assert panda.q_max[6] - 0.1 < highest < panda.q_max[6]

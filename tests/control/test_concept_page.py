@@ -1,15 +1,18 @@
 """The page on control says every parameter, every fault and nothing that the code does not."""
 
 import re
-from dataclasses import fields
+from pathlib import Path
 
 import pytest
 from tests.docs import DOCS, program
 
-from contactsafe import ControllerConfig
-from contactsafe.control import estimate, laws, supervisor
-from contactsafe.control.records import FAULTS
+from contactsafe import control
+from contactsafe.control import classification, laws, supervision
+from contactsafe.control.codes import FAULTS
+from contactsafe.control.config import STAGE_OF
+from contactsafe.control.presets import SAFE
 
+CONTROL = Path(control.__file__).parent
 PAGE = (DOCS / "concepts" / "control.md").read_text(encoding="utf-8")
 
 
@@ -18,16 +21,22 @@ def tables():
     return program("controller_tables")
 
 
-def test_both_tables_stand_in_the_page(tables):
+def test_all_tables_stand_in_the_page(tables):
     filled = tables.fill(PAGE)
     assert tables.parameters() in filled
+    assert tables.reasons() in filled
     assert tables.faults() in filled
 
 
-def test_every_parameter_has_a_row_with_meaning_and_three_values(tables):
-    rows = [line.split(" | ") for line in tables.parameters().splitlines()[2:]]
-    assert [row[0].strip("| `") for row in rows] == [field.name for field in fields(ControllerConfig)]
-    assert all(len(row) == 5 and all(cell.strip("| ") for cell in row) for row in rows)
+def test_every_parameter_has_a_row_with_bounds_meaning_and_three_values(tables):
+    rows = [line.strip("| ").split(" | ") for line in tables.parameters().splitlines() if line.startswith("| `")]
+    assert [row[0].strip("`") for row in rows] == list(STAGE_OF)
+    assert all(len(row) == 7 and all(row[2:]) for row in rows)
+
+
+def test_every_value_of_safe_that_is_its_own_has_a_reason(tables):
+    for name, (_, reason) in SAFE.items():
+        assert re.search(rf"\| `{name}` \| .* \| {re.escape(reason)} \|", tables.reasons())
 
 
 def test_values_are_the_presets_and_bold_where_they_differ_from_the_paper(tables):
@@ -43,7 +52,7 @@ def test_every_fault_has_a_row(tables):
 
 
 def test_page_names_no_parameter_that_is_not_there():
-    known = {field.name for field in fields(ControllerConfig)} | {"fault", "control_tick", "reset"}
-    known |= {name for module in (laws, estimate, supervisor) for name in vars(module)}
+    known = set(STAGE_OF) | {"fault", "control_tick", "reset"} | {file.stem for file in CONTROL.glob("*.py")}
+    known |= {name for module in (laws, classification, supervision) for name in vars(module)}
     named = set(re.findall(r"`([a-z]+_[a-z_]+)`", PAGE))
     assert named <= known

@@ -90,7 +90,9 @@ def test_a_joint_that_stands_a_little_past_its_limit_is_no_obstacle(panda, past,
     plant, controller = Plant(panda, q), controller_at(panda, presets.safe(), q)
     torques = [panda.dynamics(q, np.zeros(7))["g"]]
     plant.run(controller, hold(panda, q), 1000, each=lambda out: torques.append(out.torque))
-    assert np.abs(np.diff(torques, axis=0)).max() <= float(controller.record["params"]["torque_step"]) + 1e-9
+    assert (
+        np.abs(np.diff(torques, axis=0)).max() <= float(controller.record["params"]["one_tick"]["torque_step"]) + 1e-9
+    )
     assert panda.q_min[3] - 1e-3 < plant.q[3] < panda.q_max[3] + 1e-3
 
 
@@ -118,11 +120,11 @@ def test_measurement_of_the_wrong_shape(panda, controller, changed, text):
         ({"stiffness": np.full(6, np.nan)}, "stiffness[0] = nan; every number must be finite"),
         (
             {"stiffness": [150, 150, 4000, 150, 150, 150]},
-            "stiffness[2] = 4000 1/s² is outside [10, 1500]; scale it or widen ControllerConfig.stiffness_range",
+            "stiffness[2] = 4000 1/s² is outside [10, 1500]; scale it or widen stiffness_range of the ControllerConfig",
         ),
         (
             {"damping": [1, 20, 20, 20, 20, 20]},
-            "damping[0] = 1 1/s is outside [2, 120]; scale it or widen ControllerConfig.damping_range",
+            "damping[0] = 1 1/s is outside [2, 120]; scale it or widen damping_range of the ControllerConfig",
         ),
         ({"damping": "soft"}, "damping is str, not numbers; give 6 finite numbers"),
         ({"posture": np.zeros(6)}, "posture has shape (6,); give 7 finite numbers"),
@@ -275,4 +277,4 @@ def test_nothing_is_made_for_seven_joints_only(six_joint_arm):
     assert out.contact.in_contact
     assert out.contact.link >= 1
     assert np.dot(out.contact.torque, plant.push_torque()) > 0
-    assert controller.record["params"]["K_posture"].tolist() == [40, 40, 40, 40, 30, 20]
+    assert controller.record["params"]["impedance"]["K_posture"].tolist() == [40, 40, 40, 40, 30, 20]

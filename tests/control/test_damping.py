@@ -54,10 +54,10 @@ def test_a_damper_is_stable_just_below_the_limit_and_not_above(delay):
 
 
 @given(st.integers(0, 5), st.floats(0.0, 1.0))
-def test_the_characteristic_equation_has_no_root_outside_below_the_limit(delay, share):
+def test_the_characteristic_equation_has_no_root_outside_below_the_limit(delay, fraction):
     polynomial = np.zeros(delay + 2)
     polynomial[:2] = 1.0, -1.0
-    polynomial[-1] += 0.999 * share * largest_damping(delay)
+    polynomial[-1] += 0.999 * fraction * largest_damping(delay)
     assert np.abs(np.roots(polynomial)).max() <= 1.0 + 1e-9
 
 
@@ -90,19 +90,19 @@ def test_the_limit_is_within_a_factor_of_two_of_what_is_unstable(panda, six_join
         M_inv, limits = arm.dynamics(q, np.zeros(arm.n))["M_inv"], np.empty(arm.n)
         joint_damping_limits(M_inv, largest_damping(delay) / DT, limits)
         loosen_limits(M_inv, largest_damping(delay) / DT, limits)
-        assert still_moves(M_inv, 0.98 * limits, delay) < 10.0  # what is braked slowly is still on its way
+        assert still_moves(M_inv, 0.98 * limits, delay) < 10.0  # what is braked slowly still moves
         assert still_moves(M_inv, 2.0 * limits, delay) > 1e3
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 10), st.floats(0.0, 0.95))
-def test_braking_along_one_direction_takes_what_the_joints_dampers_leave(seed, n, share):
+def test_braking_along_one_direction_takes_what_the_joints_dampers_leave(seed, n, fraction):
     rng = np.random.default_rng(seed)
     M_inv, limits = random_inverse_inertia(rng, n), np.empty(n)
     M, direction = np.linalg.inv(M_inv), rng.normal(size=n)
     direction /= np.linalg.norm(direction)
     joint_damping_limits(M_inv, 300.0, limits)
-    d = braking_limit(direction, M, share * limits, 300.0)
-    total = np.diag(share * limits) + d * np.outer(direction, direction)
+    d = braking_limit(direction, M, fraction * limits, 300.0)
+    total = np.diag(fraction * limits) + d * np.outer(direction, direction)
     L = np.linalg.cholesky(M)
     fastest = np.linalg.eigvalsh(np.linalg.solve(L, np.linalg.solve(L, total).T))[-1]
     assert_allclose(fastest, 300.0, rtol=1e-4)
@@ -110,11 +110,11 @@ def test_braking_along_one_direction_takes_what_the_joints_dampers_leave(seed, n
 
 @given(st.lists(st.floats(0.0, 1e3), min_size=3, max_size=3), st.lists(st.floats(1e-6, 1e3), min_size=3, max_size=3))
 def test_a_share_of_damping_never_passes_its_limit(damping, limits):
-    share = np.empty(3)
-    scale_damping_into(np.array(damping), np.array(limits), share)
-    assert (share <= 1.0).all()
-    assert (share * damping <= np.array(limits) * (1.0 + 1e-12)).all()
-    assert_allclose(share[np.array(damping) <= limits], 1.0)
+    fraction = np.empty(3)
+    scale_damping_into(np.array(damping), np.array(limits), fraction)
+    assert (fraction <= 1.0).all()
+    assert (fraction * damping <= np.array(limits) * (1.0 + 1e-12)).all()
+    assert_allclose(fraction[np.array(damping) <= limits], 1.0)
 
 
 @given(st.floats(10.0, 1500.0), st.floats(2.0, 120.0))
@@ -129,7 +129,7 @@ def test_the_dampers_of_a_panda_are_as_configured(panda):
     """Its joints are heavy enough for all of `safe()`, wherever it stands."""
     config, rng, limits = safe(), np.random.default_rng(2), np.empty(7)
     rate = damping_rate(config, GAIN_MARGIN) - 2.0 * math.sqrt(450.0)
-    wanted = np.maximum(config.D_posture, config.null_damping) + config.contact_damping
+    wanted = np.maximum(config.impedance.D_posture, config.reaction.null_damping) + config.reaction.contact_damping
     for _ in range(300):
         joint_damping_limits(panda.dynamics(rng.uniform(panda.q_min, panda.q_max), np.zeros(7))["M_inv"], rate, limits)
         assert (wanted <= 1.05 * limits).all()

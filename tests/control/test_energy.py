@@ -1,7 +1,5 @@
 """Gains change no faster than keeps the impedance passive, and the command gives no more energy than it may."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,12 +7,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
-from tests.control.targets import hostile_target
+from tests.control.targets import fuzzed_target
 
 from contactsafe import Measurement, Pose, Target, presets
-from contactsafe.control.limits import passive_step, power_limit
+from contactsafe.control.impedance import passive_step
+from contactsafe.control.limits import power_limit
 
-SAFE = replace(presets.safe(), friction_compensation=False)
+SAFE = presets.safe().with_(friction_compensation=False)
 ALPHA, DT = 2.0, 0.001
 stiffnesses = arrays(float, 6, elements=st.floats(10.0, 1500.0))
 dampings = arrays(float, 6, elements=st.floats(ALPHA, 120.0))
@@ -75,19 +74,19 @@ def test_no_more_power_than_the_tank_can_pay(tau, qd, moments, tank, power):
 
 
 def energy_over_tank(arm, every, seed, ticks=4000):
-    """Let a hostile policy drive; give by how much the energy given over any window exceeded tank + power × time, J."""
+    """Let a fuzzed policy drive; give by how much the energy given over any window exceeded tank + power × time, J."""
     rng, plant, controller = np.random.default_rng(seed), Plant(arm), controller_at(arm, SAFE)
     level, lowest, worst = 0.0, 0.0, 0.0
     for k in range(ticks):
         if k % every == 0:
-            target = hostile_target(arm, rng)
+            target = fuzzed_target(arm, rng)
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
         plant.step(out.torque)
-        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.limits.tank_power_w)
         lowest = min(lowest, level)
         worst = max(worst, level - lowest)
-    return worst - SAFE.tank_j
+    return worst - SAFE.limits.tank_j
 
 
 @pytest.mark.parametrize("every", [17, 50, 170])
@@ -103,19 +102,19 @@ def test_command_gives_no_more_energy_than_the_tank_where_motors_take_any_torque
 
 
 def swept(arm, K, ticks=4000):
-    """Lead the tool 5 cm ahead; give the greatest energy of any window, J, and the share of the speed limit reached."""
+    """Lead the tool by 5 cm; return the greatest energy of any window, J, and the fraction of the speed limit."""
     rng, plant, controller = np.random.default_rng(1), Plant(arm), controller_at(arm, SAFE)
     home, level, lowest, worst, speed = arm.tool_pose(arm.home), 0.0, 0.0, 0.0, 0.0
     for k in range(ticks):
         if k % 340 == 0:
-            way = np.clip(rng.normal(size=3) * 0.3, -0.05, 0.05)
+            offset = np.clip(rng.normal(size=3) * 0.3, -0.05, 0.05)
         if k % 17 == 0:
-            position = np.clip(plant.tool_position() + way, home.position - 0.15, home.position + 0.15)
+            position = np.clip(plant.tool_position() + offset, home.position - 0.15, home.position + 0.15)
             target = Target(Pose(position, home.quat), np.full(6, K), posture=arm.home)
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), target)
         net, before = out.torque - controller.record["dynamics"]["g"], plant.qd
         plant.step(out.torque)
-        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.tank_power_w)
+        level += 0.001 * (net @ (before + plant.qd) / 2 - SAFE.limits.tank_power_w)
         lowest, speed = min(lowest, level), max(speed, np.abs(plant.qd / arm.qd_max).max())
         worst = max(worst, level - lowest)
     return worst, speed
@@ -133,4 +132,4 @@ def test_tank_that_is_full_changes_nothing(panda):
     """At rest nothing is given, so the tank stays full."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 500, UNTOUCHED)
-    assert controller.record["state"]["tank_j"] == SAFE.tank_j
+    assert controller.record["state"]["limits"]["tank_j"] == SAFE.limits.tank_j

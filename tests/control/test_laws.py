@@ -10,12 +10,11 @@ from contactsafe.control.laws import (
     contact_nullspace,
     damping_wrench,
     line_of_action_misses_tool,
-    push_along,
     stiffness_wrench,
     task_error,
     task_inertia,
     task_nullspace,
-    tool_share,
+    torque_against_contact,
 )
 from contactsafe.core.linalg import shorten
 from contactsafe.core.rotation import quat_multiply, quat_to_matrix, rotvec_to_quat
@@ -53,7 +52,7 @@ def test_task_inertia_is_the_inverse_of_mobility(seed):
 
 @given(seeds, st.integers(0, 5), st.floats(0.0, 1.0))
 def test_task_inertia_stays_bounded_when_a_direction_is_lost(seed, row, kept):
-    """At the singularity itself no eigenvalue exceeds 1/λ² = 20: no force grows without bound on the way there."""
+    """At the singularity itself no eigenvalue exceeds 1/λ² = 20: no force grows without bound on approach."""
     J, M_inv, _ = random_arm(seed, undamped=False)
     J[row] *= kept * 1e-6
     Lambda, _ = task_inertia(J, M_inv, FLOOR, DAMPING)
@@ -126,37 +125,12 @@ def test_contact_in_task_directions_leaves_the_null_space_alone(seed):
 
 
 def test_impedance_gives_each_axis_its_own_acceleration():
-    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), the pull and the damping apart."""
+    """Λ = 2: F = 2 (K e − D ẋ − J̇ q̇), stiffness and damping apart."""
     K, D = np.arange(10.0, 16.0), np.arange(1.0, 7.0)
     e, v, a = np.full(6, 0.1), np.full(6, 0.2), np.full(6, 0.3)
-    pull, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
-    assert_allclose(pull, 0.2 * K, rtol=0, atol=1e-14)
-    assert_allclose(pull + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
-
-
-@given(seeds, st.floats(0.0, 60.0), st.floats(0.0, 40.0))
-def test_tool_is_never_pulled_harder_than_the_bound_against_what_touches_it(seed, touch, bound):
-    """Along the force felt, from twice the least contact on; a pull within the bound is left as it is."""
-    rng = np.random.default_rng(seed)
-    F, n = rng.normal(size=6) * 30.0, rng.normal(size=3)
-    n /= np.linalg.norm(n)
-    share = tool_share(F, touch * n, 3.0, bound)
-    push = -n @ F[:3]
-    assert 0.0 <= share <= 1.0
-    if touch < 3.0 or push <= bound:
-        assert share == 1.0
-    elif touch >= 6.0:
-        assert_allclose(share * push, bound, rtol=1e-9, atol=1e-9)
-    else:
-        assert share * push >= bound - 1e-9
-
-
-@given(st.floats(2.9, 6.1), st.floats(-1e-6, 1e-6))
-def test_bound_on_the_tool_sets_in_without_a_step(touch, more):
-    """A touch that comes and goes about the least one would otherwise jerk the arm."""
-    F, n = np.array([0.0, 0.0, -60.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    a, b = (tool_share(F, size * n, 3.0, 20.0) for size in (touch, touch + more))
-    assert abs(a - b) < 1e-5
+    elastic, damping = stiffness_wrench(2.0 * np.eye(6), e, K, np.inf, np.inf), damping_wrench(2.0 * np.eye(6), v, a, D)
+    assert_allclose(elastic, 0.2 * K, rtol=0, atol=1e-14)
+    assert_allclose(elastic + damping, [1.0, 0.8, 0.6, 0.4, 0.2, 0.0], rtol=0, atol=1e-14)
 
 
 @given(seeds, st.floats(0.0, 0.08), st.floats(0.0, 200.0))
@@ -205,8 +179,8 @@ def test_acceleration_asked_of_the_tool_is_bounded_and_keeps_its_direction(seed,
     kept, asked = e.copy(), K * e
     acceleration = np.linalg.solve(Lambda, stiffness_wrench(Lambda, e, K, linear_max, angular_max))
     for part, most in ((slice(0, 3), linear_max), (slice(3, 6), angular_max)):
-        share = min(1.0, most / np.linalg.norm(asked[part]))
-        assert_allclose(acceleration[part], share * asked[part], rtol=1e-7, atol=1e-9)
+        fraction = min(1.0, most / np.linalg.norm(asked[part]))
+        assert_allclose(acceleration[part], fraction * asked[part], rtol=1e-7, atol=1e-9)
     assert_array_equal(e, kept)
 
 
@@ -225,14 +199,14 @@ def test_orientation_error_turns_the_tool_to_its_target(seed, angle):
 
 
 @given(seeds, st.floats(-40.0, 40.0))
-def test_push_along_the_contact_is_what_acts_along_it(seed, push):
+def test_torque_against_the_contact_is_what_acts_along_it(seed, push):
     """A command −push·a pushes with exactly `push`; what moves the arm across the contact counts nothing."""
     _, M_inv, residual = random_arm(seed)
     a = residual / np.linalg.norm(residual)
-    assert_allclose(push_along(a, M_inv, -push * a), push, rtol=0, atol=1e-9)
+    assert_allclose(torque_against_contact(a, M_inv, -push * a), push, rtol=0, atol=1e-9)
     across = np.random.default_rng(seed).normal(size=7)
     across -= a * (a @ M_inv @ across) / (a @ M_inv @ a)
-    assert_allclose(push_along(a, M_inv, across - push * a), push, rtol=0, atol=1e-9)
+    assert_allclose(torque_against_contact(a, M_inv, across - push * a), push, rtol=0, atol=1e-9)
 
 
 @given(seeds, st.floats(0.0, 22.0))
@@ -240,8 +214,8 @@ def test_removing_the_excess_leaves_the_bound(seed, bound):
     _, M_inv, residual = random_arm(seed)
     a = residual / np.linalg.norm(residual)
     tau = np.random.default_rng(seed).normal(size=7) * 20.0
-    push = push_along(a, M_inv, tau)
-    assert_allclose(push_along(a, M_inv, tau + (push - bound) * a), bound, rtol=0, atol=1e-9)
+    push = torque_against_contact(a, M_inv, tau)
+    assert_allclose(torque_against_contact(a, M_inv, tau + (push - bound) * a), bound, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("joint", range(7))
@@ -249,4 +223,4 @@ def test_push_is_positive_when_the_command_opposes_the_contact(panda, joint):
     """Contact pushes the joint forwards (a > 0), the command backwards."""
     M_inv = np.array(panda.dynamics(panda.home, np.zeros(7))["M_inv"])
     a = np.eye(7)[joint]
-    assert push_along(a, M_inv, -5.0 * a) == pytest.approx(5.0)
+    assert torque_against_contact(a, M_inv, -5.0 * a) == pytest.approx(5.0)

@@ -1,13 +1,11 @@
 """The output says what took something off the task."""
 
-from dataclasses import replace
-
 import numpy as np
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
 
 from contactsafe import Measurement, presets
 
-SAFE = replace(presets.safe(), friction_compensation=False)
+SAFE = presets.safe().with_(friction_compensation=False)
 
 
 def test_at_rest_nothing_is_limited(panda):
@@ -38,7 +36,7 @@ def test_an_arm_that_ran_into_something_says_so(panda):
 
 
 def test_a_jump_of_the_target_is_limited_by_the_torque_rate(panda):
-    controller = controller_at(panda, replace(presets.vices(), friction_compensation=False))
+    controller = controller_at(panda, presets.vices().with_(friction_compensation=False))
     out = controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED), reach(panda, [0.2, 0.0, 0.0]))
     assert out.limited_by == ("rate",)
 
@@ -52,7 +50,7 @@ def test_a_joint_within_its_margin_is_limited_by_its_range(panda):
 
 
 def test_an_empty_tank_limits_by_energy(panda):
-    plant, controller = Plant(panda), controller_at(panda, replace(SAFE, tank_j=0.05, tank_power_w=0.1))
+    plant, controller = Plant(panda), controller_at(panda, SAFE.with_(tank_j=0.05, tank_power_w=0.1))
     seen = set()
     for _ in range(600):
         out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), reach(panda, [0.1, 0.1, 0.1]))

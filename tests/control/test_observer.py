@@ -2,7 +2,6 @@
 
 import copy
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,32 +11,34 @@ from numpy.testing import assert_allclose
 from tests.control.plant import Plant, controller_at, hold, reach, wrist_meets_sphere
 
 from contactsafe import Measurement, presets
-from contactsafe.control.laws import observer_gain, observer_step
+from contactsafe.control.laws import filter_gain, observer_step
 from contactsafe.control.presets import PRESETS
 
-VICES = replace(presets.vices(), observer_gain=50.0, residual_cutoff_hz=1e6, friction_compensation=False)
+VICES = presets.vices().with_(compensation_gain=50.0, residual_cutoff_hz=1e6, friction_compensation=False)
 
 
 @given(st.floats(0.5, 300.0), st.floats(-20.0, 20.0))
 def test_step_is_taken_up_exponentially_exactly_at_the_ticks(gain, tau):
-    residual, share = np.zeros(1), observer_gain(gain, 0.001)
+    residual, fraction = np.zeros(1), filter_gain(gain, 0.001)
     for k in range(1, 301):
-        observer_step(residual, share, np.array([tau]))
+        observer_step(residual, fraction, np.array([tau]))
         assert_allclose(residual[0], tau * (1.0 - math.exp(-gain * 0.001 * k)), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("preset", PRESETS.values())
 def test_controller_takes_a_step_up_as_its_gain_says(panda, preset):
     """An arm that stands still although g − τ is commanded is held by τ."""
-    config = replace(preset(), residual_cutoff_hz=math.inf)
+    config = preset().with_(residual_cutoff_hz=math.inf)
     controller, still = controller_at(panda, config), Measurement(panda.home, np.zeros(7))
     controller.step(still, hold(panda))
     tau = np.array([1.0, -2.0, 3.0, -4.0, 5.0, -6.0, 7.0])
     for k in range(1, 200):
-        controller.record["state"]["tau"] = controller.record["dynamics"]["g"] - tau
+        controller.record["state"]["command"]["tau"] = controller.record["dynamics"]["g"] - tau
         out = controller.step(still, hold(panda))
-        assert_allclose(out.residual, tau * (1 - math.exp(-config.observer_gain * 0.001 * k)), rtol=1e-9, atol=1e-9)
-        trigger = tau * (1 - math.exp(-config.detection_gain * 0.001 * k))
+        assert_allclose(
+            out.residual, tau * (1 - math.exp(-config.observer.compensation_gain * 0.001 * k)), rtol=1e-9, atol=1e-9
+        )
+        trigger = tau * (1 - math.exp(-config.observer.detection_gain * 0.001 * k))
         assert_allclose(out.contact.torque, trigger, rtol=1e-9, atol=1e-9)
 
 
@@ -100,7 +101,7 @@ def test_wrench_at_the_tool_is_cancelled_where_it_is_measured(panda, known):
 
 def test_wrench_is_kept_in_the_residual_where_asked(panda):
     F = np.array([0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
-    plant, controller = Plant(panda), controller_at(panda, replace(VICES, cancel_tool_wrench=False))
+    plant, controller = Plant(panda), controller_at(panda, VICES.with_(cancel_tool_wrench=False))
     still = hold(panda)
     for _ in range(1500):
         out = controller.step(Measurement(plant.q, plant.qd, F), still)

@@ -36,7 +36,10 @@ def heavier(arm, times):
 def lambda_at(arm, q):
     """Give Λ as the arm's controller has it at q, (6, 6)."""
     params, now = Controller(arm).record["params"], arm.dynamics(q, np.zeros(arm.n))
-    floor, damping = float(params["manipulability_floor"]), float(params["manipulability_damping"])
+    floor, damping = (
+        float(params["impedance"]["manipulability_floor"]),
+        float(params["impedance"]["manipulability_damping"]),
+    )
     return task_inertia(now["J"].copy(), now["M_inv"].copy(), floor, damping)[0]
 
 
@@ -57,10 +60,10 @@ def test_task_inertia_is_proportional_to_the_arms_density(times, wrist):
 
 
 def test_floor_and_damping_of_the_panda(panda):
-    """w₀ and λ² as they were before they became shares of the arm's own."""
+    """w₀ and λ² as they were before they became fractions of the arm's own."""
     params = Controller(panda).record["params"]
-    assert_allclose(params["manipulability_floor"], 0.01, rtol=0.01)
-    assert_allclose(params["manipulability_damping"], 0.05, rtol=0.01)
+    assert_allclose(params["impedance"]["manipulability_floor"], 0.01, rtol=0.01)
+    assert_allclose(params["impedance"]["manipulability_damping"], 0.05, rtol=0.01)
 
 
 def test_best_mobility_is_reached_nearly_and_hardly_exceeded(panda):
@@ -80,10 +83,10 @@ def test_arm_of_two_joints_is_damped_everywhere():
     arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(ELBOW), site="tip")
     assert best_mobility(arm).directions == 2
     params = Controller(arm).record["params"]
-    assert params["manipulability_floor"] == math.inf
+    assert params["impedance"]["manipulability_floor"] == math.inf
     for q in ([0.0, 0.0], [0.5, -1.0]):
         largest = np.linalg.eigvalsh(lambda_at(arm, np.array(q)))[-1]
-        assert_allclose(largest * params["manipulability_damping"], 1.0, rtol=1e-9)
+        assert_allclose(largest * params["impedance"]["manipulability_damping"], 1.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["safe", "paper"])

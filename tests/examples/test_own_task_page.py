@@ -1,4 +1,4 @@
-"""The page on tasks of one's own: its task learns, is evaluated, and runs under any arm and engine, by its name alone."""
+"""The page on tasks of one's own: its task is learned, evaluated and run in either engine, by its name."""
 
 import json
 import re

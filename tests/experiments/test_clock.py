@@ -31,7 +31,7 @@ def test_a_controller_that_is_not_called_leaves_its_torque_in_force(panda):
     late.run(8, trace)
     torque = trace[0]["torque"]
     assert (torque[4:7] == torque[3]).all()
-    assert late.controllers[0]["state"]["elapsed"] == pytest.approx(4.0)
+    assert late.controllers[0]["state"]["clock"]["elapsed"] == pytest.approx(4.0)
 
 
 def test_a_frozen_measurement_is_the_last_one_with_its_time(panda):

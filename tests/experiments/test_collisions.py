@@ -1,11 +1,10 @@
 """The collision battery: a trial is its seed's alone, and the page can be told what is asked of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from contactsafe import presets
+from contactsafe.control.codes import COMPLY, REJECT
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import LINKS, sample_motion
 from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
@@ -66,7 +65,7 @@ def test_what_replays_a_trial_is_a_command_for_presets_and_python_for_others(bat
     assert worst["replay"] == (
         f"contactsafe experiment collisions --controllers vices,safe --trials 1 --out trial-{seed} --seed {seed}"
     )
-    own = {"vices": presets.vices(), "softer": replace(presets.safe(), contact_force_limit_comply_n=8.0)}
+    own = {"vices": presets.vices(), "softer": presets.safe().with_(contact_force_limit_comply_n=8.0)}
     (row,) = run_battery(own, [3], ["clean"]).tables[1].as_records()
     assert row["replay"] == "run_battery(controllers, [3])"
 
@@ -121,8 +120,7 @@ def test_metrics_are_what_they_say():
     rows["obstacle_force"][800:] = 10.0
     rows["tau_arm"][150, 3] = -7.0
     rows["link"][112:] = 5
-    rows["mode"][112:312] = 1
-    rows["holding"][212:312] = 1
+    rows["mode"][112:212], rows["mode"][212:312] = COMPLY, REJECT
     rows["position"][:, 0] = np.linspace(0.0, 0.03, 1000)
     rows["q"][300:400, 3] = arm.q_max[3]
     found = collision_metrics(rows, free, arm)

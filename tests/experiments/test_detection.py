@@ -1,7 +1,5 @@
 """Detection: pushes are what they claim to be, figures are what they say, and runs are reproducible."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -115,8 +113,8 @@ def short(monkeypatch):
 @pytest.mark.usefixtures("short")
 def test_a_controller_that_is_never_sure_gives_false_alarms():
     strokes = sample_strokes(ARM, 0, 2)
-    (first, _) = false_alarm_trials(ARM, "nervous", replace(presets.safe(), residual_threshold=0.05), strokes)
-    (calm, _) = false_alarm_trials(ARM, "calm", replace(presets.safe(), residual_threshold=50.0), strokes)
+    (first, _) = false_alarm_trials(ARM, "nervous", presets.safe().with_(residual_threshold=0.05), strokes)
+    (calm, _) = false_alarm_trials(ARM, "calm", presets.safe().with_(residual_threshold=50.0), strokes)
     assert first.metrics["false_alarms"] >= 1.0
     assert first.metrics["false_contact_s"] > 0.5
     assert calm.metrics == {"false_alarms": 0.0, "false_contact_s": 0.0, "minutes": 1 / 60, "touched": 0.0}

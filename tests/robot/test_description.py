@@ -1,4 +1,4 @@
-"""Facts that a real machine could have."""
+"""Descriptions that a real machine could have."""
 
 import numpy as np
 import pytest

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.ik import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve_ik, trac_ik
 
-NEAR = 0.2  # rad a joint, each its own way
+NEAR = 0.2  # rad a joint, each in a direction of its own
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_seed_that_serves_is_the_answer(reachable, solve):
 
 
 def test_small_moves_of_the_tool_are_small_moves_of_the_arm(panda, solve):
-    """A circle of 10 cm at 60 Hz, each answer the next seed: no jump to another posture on the way round."""
+    """A circle of 10 cm at 60 Hz, each answer the next seed: no jump to another posture on the round."""
     start, q = panda.tool_pose(panda.home), panda.home
     for angle in np.linspace(0, 2 * np.pi, 120):
         pose = start._replace(position=start.position + 0.1 * np.array([np.cos(angle) - 1, np.sin(angle), 0.0]))

@@ -86,8 +86,8 @@ def test_a_hundred_laps_leave_the_elbow_where_it_was(name, request):
     for _ in range(10):
         centre, radius = rng.uniform([0.42, -0.25, 0.25], [0.48, 0.25, 0.4]), rng.uniform(0.05, 0.2)
         for plane in PLANES:
-            for way in (lambda *at: Pose(circle(*at), DOWN), eight_with_turns):
-                lap = [way(centre, radius, plane, angle) for angle in angles]
+            for path in (lambda *at: Pose(circle(*at), DOWN), eight_with_turns):
+                lap = [path(centre, radius, plane, angle) for angle in angles]
                 first = kinematics.posture(lap[0])
                 for pose in 100 * lap:
                     last = kinematics.posture(pose)
@@ -119,11 +119,11 @@ def test_no_self_motion_from_there_is_nearer_home(all_arms):
             least = nearest_home_far_from_limits(arm, q)
             J = arm.dynamics(q, np.zeros(arm.n))["J"]
             for direction in np.linalg.svd(J)[2][6:]:
-                ahead, behind = (
+                forward, behind = (
                     nearest_home_far_from_limits(arm, kinematics.solve(pose, q + step * direction))
                     for step in (0.02, -0.02)
                 )
-                assert ahead > least - 1e-6
+                assert forward > least - 1e-6
                 assert behind > least - 1e-6
                 slope = (
                     nearest_home_far_from_limits(arm, q + 1e-5 * direction)

@@ -32,7 +32,7 @@ def test_capsules_are_mujocos(postures, tool):
         np.testing.assert_allclose((starts[i] + ends[i]) / 2, data.geom_xpos[geoms], atol=1e-9)
         axis = data.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2] * model.geom_size[geoms, 1, None] * 2
         length = ends[i] - starts[i]
-        sign = np.sign(np.sum(axis * length, axis=1, keepdims=True))  # MuJoCo may run a capsule the other way
+        sign = np.sign(np.sum(axis * length, axis=1, keepdims=True))  # MuJoCo may run a capsule in the other direction
         np.testing.assert_allclose(length, sign * axis, atol=1e-9)
 
 

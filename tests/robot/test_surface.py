@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.robot.worlds import OWN_SCENE
 
+from contactsafe.control.contact_geometry import best_point, contact_lever, surface_torque
 from contactsafe.robot import robots
-from contactsafe.robot.contact import best_point, contact_lever, surface_torque
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
 
@@ -150,8 +150,8 @@ def test_surface_of_geoms_finds_contacts_as_often_as_that_of_capsules(panda):
             found, length = Placed(arm, q).search(20.0 * torque)
             right[k, i], near[k, i] = found == link, abs(found - link) <= 1
             lever[k, i] = 0.5 < length / np.linalg.norm(torque) < 2.0
-    for share in (right, near, lever):
-        of_capsules, of_geoms = share.mean(axis=0)
+    for fractions in (right, near, lever):
+        of_capsules, of_geoms = fractions.mean(axis=0)
         assert of_geoms > of_capsules - 0.05
 
 
@@ -187,7 +187,7 @@ def test_lever_guessed_from_the_link_is_that_of_its_centre_where_the_push_is_the
         link = int(rng.integers(4, 8))
         body, J = panda.model.body(f"link{link}").id, np.zeros((3, 7))
         mujoco.mj_jacBodyCom(panda.model, placed.data, J, None, body)
-        force = np.linalg.svd(J)[0][:, 0]  # the way in which the link moves most
+        force = np.linalg.svd(J)[0][:, 0]  # the direction in which the link moves most
         torque = J.T @ force
         lever = contact_lever(placed.handle, link, torque / np.linalg.norm(torque))
         assert_allclose(lever, np.linalg.norm(torque), rtol=0.05)

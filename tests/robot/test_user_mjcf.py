@@ -218,7 +218,7 @@ REFUSED = {
     "wrong order": (
         [], {"joints": ["b", "a"]}, "joints = ['b', 'a'] are not in order; from base to tip they stand so: 'a', 'b'",
     ),
-    "not on the way": (
+    "does not move the site": (
         ["<worldbody>", '<worldbody><body><joint name="o"/><geom size=".1"/></body>'], {"joints": ["a", "o"]},
         "joint 'o' does not move site 'tip'; joints that do, base to tip: 'a', 'b'",
     ),

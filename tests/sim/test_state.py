@@ -124,7 +124,7 @@ def test_a_snapshot_of_something_else_is_refused(course):
         ("controllers", "state.search_at", 10**9),
         ("controllers", "state.turn", 7),
         ("controllers", "handle.surface_points", 10**9),
-        ("controllers", "state.tau", np.nan),
+        ("controllers", "state.command.tau", np.nan),
     ],
 )
 def test_an_index_of_1e9_in_a_snapshot_is_refused_and_nothing_changed(course, part, field, value):

@@ -9,8 +9,9 @@ import pytest
 from numpy.testing import assert_array_equal
 from tests.sim.scenes import BOARD_Z, CALM, DOWN, aim, panda, posture, run, worlds_at
 
-from contactsafe.control.controller import Controller, Measurement, Target
+from contactsafe.control.controller import Controller
 from contactsafe.control.presets import by_name
+from contactsafe.control.signals import Measurement, Target
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Pose
 from contactsafe.sim.config import PlantConfig, SensorConfig, WorldConfig

@@ -20,7 +20,7 @@ def taken_over(worlds, ticks=600):
 def largest_step(worlds, before, after):
     """Largest change of the command from tick to tick, in parts of what the rate limit allows."""
     torque = np.concatenate([before["torque"], after["torque"]])
-    return np.abs(np.diff(torque, axis=0)).max() / worlds.controllers["params"]["torque_step"][0]
+    return np.abs(np.diff(torque, axis=0)).max() / worlds.controllers["params"]["one_tick"]["torque_step"][0]
 
 
 def test_a_tool_that_presses_on_the_plate_is_taken_over_without_a_jump_or_a_false_contact():
@@ -44,11 +44,11 @@ def test_a_moving_arm_is_taken_over_without_a_jump_or_a_false_contact(place):
     run(worlds, 100)
     moving = np.abs(worlds.controllers["measurement"]["qd"][0]).max()
     worlds._owners[0].reset(*(worlds.controllers["measurement"][name][0].copy() for name in ("q", "qd")))
-    before = worlds.controllers["state"]["tau"].copy()
+    before = worlds.controllers["state"]["command"]["tau"].copy()
     after = run(worlds, 1500)[0]
     assert moving > 0.3
     torque = np.concatenate([before, after["torque"]])
-    assert np.abs(np.diff(torque, axis=0)).max() <= worlds.controllers["params"]["torque_step"][0] + 1e-9
+    assert np.abs(np.diff(torque, axis=0)).max() <= worlds.controllers["params"]["one_tick"]["torque_step"][0] + 1e-9
     assert not after["mode"].any()
     assert np.abs(np.diff(after["q"][-50:], axis=0)).max() < 1e-4
     worlds.close()

@@ -18,7 +18,7 @@ from contactsafe.tasks import DEFAULT_TASK, TASKS
 COMPILES = "the first run compiles for a minute or two"
 
 TaskName = Annotated[str, one_of(TASKS)]
-Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS)]
+Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS, check=presets.by_name)]
 BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
 
 

@@ -3,19 +3,20 @@
 import math
 
 from contactsafe.control.damping import joint_damping_limits
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import matvec_into
 from contactsafe.core.stack import stack_vector
 
 _HASTE = 0.8
-"""Share of what is too fast from which the brake takes over, gradually."""
+"""Fraction of what is too fast from which the brake takes over, gradually."""
 
-_SHARE = 0.25
+_USABLE = 0.25
 """Of torque and torque rate that each of the two brakes may use; the rest is for gravity and what they do not know."""
 
 
 @compiled
-def braking_fraction(qd, speed, c, speed_max, tau_max):
+def braking_fraction(qd: Vector, speed: Vector, c: Vector, speed_max: Vector, tau_max: Vector) -> float:
     """Return how much of a command a brake must replace, 0 … 1: all of it where the arm is too fast.
 
     That is where a joint is as fast as its limit, or will be before the torque that drives it can be taken off, or
@@ -36,8 +37,10 @@ def braking_fraction(qd, speed, c, speed_max, tau_max):
 
 
 @compiled
-def brake_into(M, M_inv, qd, tau_max, torque_rate, rate, out):
-    """Fill what brakes the whole arm, −ν M q̇ − D q̇, (n,), N m, and give it back.
+def brake_into(
+    M: Matrix, M_inv: Matrix, qd: Vector, tau_max: Vector, torque_rate: float, rate: float, out: Vector
+) -> Vector:
+    """Fill what brakes the whole arm, −ν M q̇ − D q̇, (n,), N m, and return it.
 
     The first brakes all joints alike and flings none; the second each by itself, what is light fast. Neither can ever
     feed energy, and both are as fast as a sampled loop and the motors can follow: see `_followed`.
@@ -66,7 +69,7 @@ def brake_into(M, M_inv, qd, tau_max, torque_rate, rate, out):
 
 
 @compiled
-def _followed(momentum, tau_max, torque_rate):
+def _followed(momentum: float, tau_max: float, torque_rate: float) -> float:
     """Return the rate at which a motor whose torque changes no faster than `torque_rate` can brake a momentum, 1/s.
 
     p' = −√(2 s r p) asks for the torque rate s r all the way down to rest. A brake that asks for more lags behind
@@ -74,4 +77,4 @@ def _followed(momentum, tau_max, torque_rate):
     """
     if momentum == 0.0:
         return math.inf
-    return min(math.sqrt(2.0 * _SHARE * torque_rate / momentum), _SHARE * tau_max / momentum)
+    return min(math.sqrt(2.0 * _USABLE * torque_rate / momentum), _USABLE * tau_max / momentum)

@@ -6,6 +6,7 @@ below β m/dt and no further, β depending on the delay alone; `docs/concepts/da
 
 import math
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matmul_into, matvec_into, spd_inverse
 from contactsafe.core.stack import stack_matrix, stack_vector
@@ -30,7 +31,7 @@ def largest_damping(delay_ticks: float) -> float:
 
 
 @compiled
-def joint_damping_limits(M_inv, rate, out):
+def joint_damping_limits(M_inv: Matrix, rate: float, out: Vector) -> None:
     """Fill what each joint's damper may be at most, all of them at once, (n,), N m s/rad.
 
     D_i = rate w_i / (|M⁻¹| w)_i for any w > 0 gives D |M⁻¹| w = rate w, so that by Perron and Frobenius no eigenvalue
@@ -54,7 +55,7 @@ def joint_damping_limits(M_inv, rate, out):
 
 
 @compiled
-def loosen_limits(M_inv, rate, limits):
+def loosen_limits(M_inv: Matrix, rate: float, limits: Vector) -> None:
     """Raise limits of `joint_damping_limits` in place, all alike, by what the signs of M⁻¹ leave.
 
     With S = D^½ M⁻¹ D^½ the largest eigenvalue of M⁻¹ D is at most (tr S⁸)^(1/8), which is
@@ -82,8 +83,8 @@ def loosen_limits(M_inv, rate, limits):
 
 
 @compiled
-def scale_damping_into(damping, limits, out):
-    """Fill the share of its damping that every joint may have, (n,), 0 … 1.
+def scale_damping_into(damping: Vector, limits: Vector, out: Vector) -> None:
+    """Fill the fraction of its damping that every joint may have, (n,), 0 … 1.
 
     Args:
         damping: all that is asked of a joint, (n,), N m s/rad.
@@ -95,7 +96,7 @@ def scale_damping_into(damping, limits, out):
 
 
 @compiled
-def task_damping_into(K, D, delay_s, out):
+def task_damping_into(K: Vector, D: Vector, delay_s: float, out: Vector) -> Vector:
     """Fill the damping of the task, (6,), 1/s: what is asked, and at least twice what the delay takes away.
 
     A spring that acts late by τ drives what it holds, as a damper of −K τ would.
@@ -111,7 +112,7 @@ def task_damping_into(K, D, delay_s, out):
 
 
 @compiled
-def braking_limit(direction, M, joint_damping, rate):
+def braking_limit(direction: Vector, M: Matrix, joint_damping: Vector, rate: float) -> float:
     """Return what may be braked with along one direction beside dampers of the joints, N m s/rad.
 
     rate M − D − d a aᵀ ⪰ 0 holds up to d = 1/(aᵀ G⁻¹ a) with G = rate M − D.

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import dot, matmul, matmul_into, matvec, matvec_into, matvec_t_into, shorten, spd_inverse
 from contactsafe.core.rotation import orientation_error
@@ -15,8 +16,8 @@ from contactsafe.core.stack import stack_matrix, stack_vector
 
 
 @compiled
-def task_inertia(J, M_inv, manipulability_floor, damping_max):
-    """Give Λ = (J M⁻¹ Jᵀ)⁻¹, damped where the arm loses a direction.
+def task_inertia(J: Matrix, M_inv: Matrix, manipulability_floor: float, damping_max: float) -> tuple[Matrix, Matrix]:
+    """Return Λ = (J M⁻¹ Jᵀ)⁻¹, damped where the arm loses a direction.
 
     Below a floor of manipulability w = det(J M⁻¹ Jᵀ) a term λ² I is added before inverting, growing smoothly from zero
     as (1 − w/w₀)² (Nakamura & Hanafusa 1986): the force asked along a lost direction stays finite.
@@ -43,7 +44,7 @@ def task_inertia(J, M_inv, manipulability_floor, damping_max):
 
 
 @compiled
-def _determinant(A):
+def _determinant(A: Matrix) -> float:
     """Determinant of a symmetric positive semi-definite matrix, by Cholesky's pivots; 0 where one is not positive."""
     n = A.shape[0]
     L = stack_matrix(n, n)
@@ -62,8 +63,8 @@ def _determinant(A):
 
 
 @compiled
-def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
-    """Give what pulls the tool to its target, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
+def stiffness_wrench(Lambda: Matrix, error: Vector, K_task: Vector, linear_max: float, angular_max: float) -> Vector:
+    """Return the task stiffness force, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
 
     Args:
         Lambda: task inertia, (6, 6).
@@ -81,8 +82,8 @@ def stiffness_wrench(Lambda, error, K_task, linear_max, angular_max):
 
 
 @compiled
-def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
-    """Give what damps the tool, −Λ (D ẋ + J̇ q̇) of (4), (6,), N and N m.
+def damping_wrench(Lambda: Matrix, velocity: Vector, Jdot_qd: Vector, D_task: Vector) -> Vector:
+    """Return the damping force of the task, −Λ (D ẋ + J̇ q̇) of (4), (6,), N and N m.
 
     Args:
         Lambda: task inertia, (6, 6).
@@ -97,8 +98,8 @@ def damping_wrench(Lambda, velocity, Jdot_qd, D_task):
 
 
 @compiled
-def task_error(position_d, quat_d, position, rotation):
-    """Give x_d − x: position difference, then rotation vector of R_d Rᵀ, world axes, (6,), m and rad."""
+def task_error(position_d: Vector, quat_d: Vector, position: Vector, rotation: Matrix) -> Vector:
+    """Return x_d − x: position difference, then rotation vector of R_d Rᵀ, world axes, (6,), m and rad."""
     error = np.empty(6)
     rotvec = orientation_error(quat_d, rotation)
     for i in range(3):
@@ -108,8 +109,8 @@ def task_error(position_d, quat_d, position, rotation):
 
 
 @compiled
-def task_nullspace(J, J_bar):
-    """Give N_t = I − J# J, (16), (n, n); J_bar is the dynamically consistent inverse M⁻¹ Jᵀ Λ, (n, 6)."""
+def task_nullspace(J: Matrix, J_bar: Matrix) -> Matrix:
+    """Return N_t = I − J# J, (16), (n, n); J_bar is the dynamically consistent inverse M⁻¹ Jᵀ Λ, (n, 6)."""
     N = matmul(J_bar, J)
     for i in range(N.shape[0]):
         for j in range(N.shape[1]):
@@ -119,8 +120,8 @@ def task_nullspace(J, J_bar):
 
 
 @compiled
-def contact_nullspace(N_t, M_inv, residual):
-    """Remove the contact direction from the task null space.
+def contact_nullspace(N_t: Matrix, M_inv: Matrix, residual: Vector) -> Matrix:
+    """Remove the contact direction from the task null space; return the projector, (n, n).
 
     N_ct = N_t (I − a# a) with a = residualᵀ N_t and a# = M⁻¹ aᵀ / (a M⁻¹ aᵀ), (21). The printed law is 0/0 where the
     contact lies wholly in task directions; there N_ct = N_t.
@@ -129,9 +130,6 @@ def contact_nullspace(N_t, M_inv, residual):
         N_t: task null-space projector, (n, n).
         M_inv: inverse joint inertia, (n, n), 1/(kg m²).
         residual: contact torque on the arm, (n,), N m.
-
-    Returns:
-        Projector, (n, n).
     """
     n = N_t.shape[0]
     a = matvec_t_into(N_t, residual, stack_vector(n))
@@ -149,8 +147,8 @@ def contact_nullspace(N_t, M_inv, residual):
 
 
 @compiled
-def push_along(direction, M_inv, tau_net):
-    """Give the torque with which a command pushes against a contact, N m.
+def torque_against_contact(direction: Vector, M_inv: Matrix, tau_net: Vector) -> float:
+    """Return the torque with which a command acts against a contact, N m.
 
     s = −a M⁻¹ tau_net / (a M⁻¹ aᵀ): the commanded acceleration against the contact, as a torque along it.
 
@@ -164,56 +162,19 @@ def push_along(direction, M_inv, tau_net):
 
 
 @compiled
-def tool_share(F_spring, force, contact_n, push_n):
-    """Give the share of the task's pull with which the tool presses no harder than a bound on what it touches.
-
-    Args:
-        F_spring: what pulls the tool to its target, (6,), N and N m.
-        force: of the environment on the tool, (3,), N.
-        contact_n: least force that counts as contact, N; from twice as much on the bound is in force, between the two
-            it comes down from infinity.
-        push_n: the bound, N.
-
-    Returns:
-        0 … 1; 1 without contact, or where the task pulls less than the bound against it.
-    """
-    size = math.sqrt(dot(force, force))
-    if size < contact_n:
-        return 1.0
-    push = -dot(force, F_spring[:3]) / size * min((size - contact_n) / contact_n, 1.0)
-    return 1.0 if push <= push_n else push_n / push
-
-
-@compiled
-def is_pushed(drop, moved, lever, stiffness):
-    """Tell something that pushes the arm from something that is in its way, by what giving way to it brings.
-
-    The torque of a spring of k N/m at a lever arm of l falls by k l² for every radian that the arm recedes; a pusher
-    goes on pushing. Half the fall that the softest obstacle would show draws the line.
-
-    Args:
-        drop: by which the contact's torque has fallen, N m.
-        moved: by which the arm has receded along the contact's direction meanwhile, rad.
-        lever: of the contact, m.
-        stiffness: of the softest thing that counts as an obstacle, N/m.
-    """
-    return drop < 0.5 * stiffness * lever * lever * moved
-
-
-@compiled
-def momentum_into(M, qd, out):
+def momentum_into(M: Matrix, qd: Vector, out: Vector) -> Vector:
     """Fill p = M q̇, (10), (n,), kg m²/s, and give it back."""
     return matvec_into(M, qd, out)
 
 
 @compiled
-def observer_gain(gain, dt):
-    """Give 1 − exp(−K dt), the share of a step that a first-order observer of gain K (1/s) takes up in one tick."""
+def filter_gain(gain: float, dt: float) -> float:
+    """Return 1 − exp(−K dt), the fraction of a step that a first-order filter of gain K (1/s) takes up in a tick."""
     return 1.0 - math.exp(-gain * dt)
 
 
 @compiled
-def observer_step(residual, share, tau_external):
+def observer_step(residual: Vector, gain: float, tau_external: Vector) -> None:
     """Advance the momentum observer in place by one tick, (12)-(14).
 
     r ← r + (1 − exp(−K dt)) (tau_external − r), where tau_external = Δp/dt − (tau_m + Jᵀ w − β) is the raw external
@@ -222,18 +183,20 @@ def observer_step(residual, share, tau_external):
 
     Args:
         residual: (n,), N m; updated.
-        share: `observer_gain`.
+        gain: `filter_gain`.
         tau_external: (n,), N m.
     """
     for i in range(residual.shape[0]):
-        residual[i] += share * (tau_external[i] - residual[i])
+        residual[i] += gain * (tau_external[i] - residual[i])
 
 
 @compiled
-def identify_masses(mass_error, covariance, row, torque, variance, largest):
-    """Learn in place what the links weigh from one joint's gravity torque: one step of a Kalman filter.
+def identify_masses(
+    mass_error: Vector, covariance: Matrix, row: Vector, torque: float, variance: float, largest: Vector
+) -> None:
+    """Identify in place the masses of the links from one joint's gravity torque: one step of a Kalman filter.
 
-    What a link cannot weigh is not believed: a push too faint to be noticed would otherwise be learned as weight.
+    A mass that no link can have is not believed: a push too faint to be noticed would otherwise be taken for weight.
 
     Args:
         mass_error: relative error of each link's mass, (m,); updated.
@@ -244,16 +207,16 @@ def identify_masses(mass_error, covariance, row, torque, variance, largest):
         largest: relative error that is believed at most, (m,).
     """
     P_row = matvec_into(covariance, row, stack_vector(row.shape[0]))
-    share = 1.0 / (dot(row, P_row) + variance)
+    gain = 1.0 / (dot(row, P_row) + variance)
     for i in range(row.shape[0]):
-        mass_error[i] = min(max(mass_error[i] + P_row[i] * share * torque, -largest[i]), largest[i])
+        mass_error[i] = min(max(mass_error[i] + P_row[i] * gain * torque, -largest[i]), largest[i])
         for j in range(row.shape[0]):
-            covariance[i, j] -= P_row[i] * share * P_row[j]
+            covariance[i, j] -= P_row[i] * gain * P_row[j]
 
 
 @compiled
-def line_of_action_misses_tool(wrench, radius, margin):
-    """Tell whether a wrench at the tool point cannot come from a touch of the tool: its line passes elsewhere.
+def line_of_action_misses_tool(wrench: Vector, radius: float, margin: float) -> bool:
+    """Tell whether a wrench at the tool point cannot come from a contact of the tool: its line of action misses it.
 
     Args:
         wrench: about the tool point, (6,), N and N m.

@@ -1,446 +1,274 @@
-"""One control tick: measurement and target in, torque out. Nothing else in this package computes a torque."""
+"""One control tick: measurement and target in, torque out. Nothing else in this package computes a torque.
+
+measurement → observer → detection → isolation → identification → classification → reaction → limits → torque
+"""
 
 import math
 
-from contactsafe.control.braking import brake_into, braking_fraction
-from contactsafe.control.clock import (
-    BRIDGE_TICKS,
-    all_usable,
-    is_usable,
-    receive,
-    set_step,
-    stop_late_target,
-    stop_torque,
-)
-from contactsafe.control.damping import (
-    braking_limit,
-    joint_damping_limits,
-    loosen_limits,
-    scale_damping_into,
-    task_damping_into,
-)
-from contactsafe.control.estimate import (
-    correct_gravity,
-    identify_link_masses,
-    observe,
-    separate_tool_wrench,
-    set_thresholds,
-    start,
-)
-from contactsafe.control.laws import (
-    contact_nullspace,
-    damping_wrench,
-    observer_step,
-    push_along,
-    stiffness_wrench,
-    task_error,
-    task_inertia,
-    task_nullspace,
-    tool_share,
-)
-from contactsafe.control.limits import (
-    joint_excess,
-    joint_stop_gains,
-    joint_stop_torque,
-    limit_torque,
-    passive_step,
-    power_limit,
-    predict_velocity,
-)
-from contactsafe.control.load import identify_payload, reset_payload_estimate, take_off_payload
-from contactsafe.control.records import (
-    BAD_GAIN,
+import numpy as np
+
+from contactsafe.control import reaction
+from contactsafe.control.classification import contact_kind
+from contactsafe.control.clock import receive, set_step
+from contactsafe.control.codes import (
     BAD_MEASUREMENT,
-    BAD_QUATERNION,
-    BAD_TARGET,
+    COMPLY,
     FREE,
-    LIMITED_BY_CONTACT,
-    LIMITED_BY_ENERGY,
     LIMITED_BY_LOAD,
-    LIMITED_BY_RANGE,
-    LIMITED_BY_RATE,
-    LIMITED_BY_TOOL_FORCE,
+    LOAD,
     MISSING,
     NO_TORQUE,
     RUNAWAY,
 )
-from contactsafe.control.supervisor import supervise
-from contactsafe.core.compiled import compiled
-from contactsafe.core.linalg import dot, matmul, matvec_t_into, shorten
+from contactsafe.control.detection import set_thresholds
+from contactsafe.control.impedance import (
+    compose_into,
+    follow_gains,
+    posture_torques_into,
+    set_joint_damping,
+    task_wrenches,
+)
+from contactsafe.control.laws import contact_nullspace, task_error, task_inertia, task_nullspace, torque_against_contact
+from contactsafe.control.limits import fill_tank, limit_command, limit_torque, runs_away
+from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
+from contactsafe.control.observer import observe, start_observer
+from contactsafe.control.payload import (
+    identify_payload,
+    is_settled,
+    load_regressor_into,
+    load_sags,
+    reset_payload,
+    take_off_payload,
+)
+from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
+from contactsafe.control.stopping import stop_late_target, stop_torque
+from contactsafe.control.supervision import supervise
+from contactsafe.control.target import accept_target
+from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
+from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.core.compiled import compiled, inlined
+from contactsafe.core.linalg import dot, matmul
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
-from contactsafe.robot.friction import joint_friction_into
-
-_WHOLE = 0.99
-"""A share of the task this large leaves nothing out that anyone would notice."""
 
 
 @compiled(nogil=True)
-def control_tick(c):
+def control_tick(c: Record) -> None:
     """Run one tick of a `controller_dtype` record in place: reads `measurement` and `target`, writes `output`.
 
-    Order: measurement and time, nominal dynamics, observer, supervisor, weighing, law, push bound, joint stops, energy,
-    speed, friction, limits. Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says
-    why.
+    Bad numbers never raise: they are bridged, or the last good target holds, and `fault` says why.
     """
-    state, usable = c.state, is_usable(c)
+    state, dynamics = c.state, c.dynamics
+    usable = is_usable(c.measurement, c.params.arm, state.clock.braking)
     if not usable:
-        _latch(state, BAD_MEASUREMENT)
+        latch(state, BAD_MEASUREMENT)
         if state.started == 0:
             _wait(c)
             return
     receive(c, usable)
-    _accept_target(c)
-    update_dynamics(c.handle, state.q, state.qd, c.dynamics)
-    take_off_payload(c)
-    correct_gravity(c)
+    latch(state, accept_target(state.target, c.target, c.params.impedance))
+    update_dynamics(c.handle, state.arm.q, state.arm.qd, dynamics)
+    if c.payload.in_wrench != 0 and state.clock.bridged == 0:
+        seconds = max(state.clock.since, 1.0) * c.params.clock.dt
+        take_off_payload(state.payload, state.arm, c.payload, dynamics, c.handle.gravity, seconds, state.started)
+    mass_variance = c.params.identification.mass_variance
+    correct_gravity(state.link_masses, dynamics, c.handle, state.arm.has_wrench, mass_variance)
     if state.started == 0:
-        start(c)
-        reset_payload_estimate(state)
-    stop_late_target(c)
-    Lambda, J_M_inv = task_inertia(
-        c.dynamics.J, c.dynamics.M_inv, c.params.manipulability_floor, c.params.manipulability_damping
-    )
+        _start(c)
+    stop_late_target(state.clock, state.target, c.target.kept, state.arm, dynamics, c.params.clock)
+    known = c.params.impedance
+    Lambda, J_M_inv = task_inertia(dynamics.J, dynamics.M_inv, known.manipulability_floor, known.manipulability_damping)
     J_bar = matmul(J_M_inv.T, Lambda)
-    set_step(c, min(state.since, BRIDGE_TICKS + 1.0))
-    observe(c)
-    if state.bridged == 0:
-        set_thresholds(c)
-        separate_tool_wrench(c, J_bar)
-        supervise(c)
-        identify_link_masses(c)
-        identify_payload(c)
-        state.turn = (state.turn + 1) % state.tau.shape[0]
-        _watch_speed(c)
-        state.since = 0.0
-    set_step(c, state.elapsed)
+    _estimate(c, J_bar)
+    set_step(state.step, c.params.one_tick, state.clock.elapsed)
     tau = _law(c, Lambda, J_bar)
-    if state.braking != 0:
-        tau = stop_torque(c) + c.dynamics.c + c.dynamics.g
-    _finish(c, tau)
+    if state.clock.braking != 0:
+        tau = stop_torque(state.clock, state.arm, dynamics.M)
+    _send(c, tau)
 
 
 @compiled(nogil=True)
-def tick_at(controllers, i):
+def tick_at(controllers: np.ndarray, i: int) -> None:
     """Run `control_tick` on one of an array of records: Python hands over an array far faster than a record."""
     control_tick(controllers[i])
 
 
 @compiled
-def _latch(state, fault):
+def latch(state: Record, fault: int) -> None:
+    """Keep the first fault since reset; 0 is none."""
     if state.fault == 0:
         state.fault = fault
 
 
 @compiled
-def _wait(c):
+def _wait(c: Record) -> None:
     """Repeat the torque that reset found until the first usable measurement; after 20 ticks go over to gravity."""
-    state = c.state
-    state.bridged += 1
-    if state.bridged > BRIDGE_TICKS:
-        state.fault, state.braking = MISSING, 1
+    state, clock, command = c.state, c.state.clock, c.state.command
+    clock.bridged += 1
+    if clock.bridged > BRIDGE_TICKS:
+        state.fault, clock.braking = MISSING, 1
         tau = c.dynamics.g.copy()
-        limit_torque(tau, state.tau, c.params.tau_max, c.params.torque_step, c.dynamics.M_inv)
-        state.tau[:] = tau
-    c.output.torque[:] = state.tau
-    c.output.fault, c.output.bridged, c.output.braked = state.fault, state.bridged, state.braking
+        limit_torque(tau, command.tau, c.params.arm.tau_max, c.params.one_tick.torque_step, c.dynamics.M_inv)
+        command.tau[:] = tau
+    c.output.torque[:] = command.tau
+    c.output.fault, c.output.bridged, c.output.braked = state.fault, clock.bridged, clock.braking
 
 
 @compiled
-def _target_fault(target, params):
-    usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_posture)
-    if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
-        return BAD_TARGET
-    if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
-        return BAD_QUATERNION
-    for i in range(6):
-        K, D = target.K_task[i], target.D_task[i]
-        if K < params.stiffness_min or K > params.stiffness_max or D < params.damping_min or D > params.damping_max:
-            return BAD_GAIN
-    return 0
+def _start(c: Record) -> None:
+    """Begin where the arm is: momentum as measured, command as last sent, masses as the model says."""
+    state = c.state
+    state.started = 1
+    state.reaction.task_scale, state.reaction.posture_scale = 1.0, 1.0
+    state.limits.tank_j = c.params.limits.tank_j
+    state.impedance.K_task[:] = state.target.K_task
+    state.impedance.D_task[:] = state.target.D_task
+    start_link_masses(state.link_masses, c.dynamics.mass_regressor, c.params.identification.mass_variance)
+    start_observer(state.observer, state.command, c.dynamics, state.arm.qd)
+    reset_payload(state.payload)
 
 
-@compiled
-def _accept_target(c):
-    """Take the target over where it is sound; latch the reason where it is not."""
-    if c.target.kept != 0:
+@inlined
+def _estimate(c: Record, J_bar: Matrix) -> None:
+    """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
+    state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
+    detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
+    set_step(state.step, params.one_tick, min(state.clock.since, BRIDGE_TICKS + 1.0))
+    observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params)
+    if state.clock.bridged > 0:
         return
-    fault = _target_fault(c.target, c.params)
-    if fault != 0:
-        _latch(c.state, fault)
-        return
-    held = c.state.target
-    norm = math.sqrt(dot(c.target.quat, c.target.quat))
-    for i in range(4):
-        held.quat[i] = c.target.quat[i] / norm
-    held.position[:] = c.target.position
-    held.K_task[:] = c.target.K_task
-    held.D_task[:] = c.target.D_task
-    held.q_posture[:] = c.target.q_posture
-
-
-@compiled
-def _watch_speed(c):
-    """Latch a fault where a joint stays beyond its speed limit for longer than braking it takes."""
-    state, params = c.state, c.params
-    for i in range(state.overspeed_s.shape[0]):
-        excess = abs(state.qd[i]) - params.runaway_speed[i]
-        if excess <= 0.0:
-            state.overspeed_s[i] = 0.0
-            continue
-        state.overspeed_s[i] += state.step.dt
-        if state.overspeed_s[i] > params.reversal_s[i] + excess * c.dynamics.M[i, i] / params.tau_max[i]:
-            state.fault, state.runaway = RUNAWAY, 1
-
-
-@compiled
-def _law(c, Lambda, J_bar):
-    """Free law (17) or contact-aware law (18), (21), (22), with the push bounded; tau_m as a model asks, (n,), N m.
-
-    What pulls towards a target (stiffness, posture) is kept apart from what damps: the task's share in force, 1 in
-    peace, scales the one and never the other.
-    """
-    state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
-    n = state.q.shape[0]
-    passive_step(
-        state.K_task,
-        state.D_task,
-        target.K_task,
-        target.D_task,
-        state.step.dt,
-        params.damping_min,
-        params.passive_gains != 0,
+    set_thresholds(
+        detection, observer, masses.gravity_sigma, state.arm.qd, dynamics.CT_qd, params.detection, params.arm.friction
     )
+    if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
+        take_all_for_the_arm(tool, detection.residual, observer)
+    else:
+        memory_gain = state.step.tool_memory_gain if state.mode == FREE else 0.0
+        separate_tool_wrench(tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, params.identification)
+    supervise(c)
+    _identify(c)
+    if _has_unknown_load(c) and state.clock.braking == 0 and state.limits.runaway == 0:
+        state.fault = LOAD  # it takes the place of faults that are over
+    state.turn = (state.turn + 1) % state.arm.q.shape[0]
+    if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
+        state.fault, state.limits.runaway = RUNAWAY, 1
+    state.clock.since = 0.0
+
+
+@inlined
+def _identify(c: Record) -> None:
+    """Identify link masses from one joint's residual, while nothing touches the arm."""
+    state, params, observer, dynamics = c.state, c.params, c.state.observer, c.dynamics
+    i, untouched = state.turn, state.mode == FREE and state.detection.quiet_ticks > 0
+    identify_link_masses(
+        state.link_masses, i, observer.residual[i], state.detection.model_uncertainty[i], dynamics.mass_regressor[i],
+        state.step.dt, untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
+    )  # fmt: skip
+
+
+@inlined
+def _has_unknown_load(c: Record) -> bool:
+    """Identify the payload from one joint's torque, all that acts from outside; tell whether it keeps the tool away."""
+    state, dynamics, gravity, dt, i = c.state, c.dynamics, c.handle.gravity, c.state.step.dt, c.state.turn
+    payload, known_kg = state.payload, c.payload.mass
+    if not is_settled(payload, state.arm.qd, dt):
+        return False
+    torque = state.observer.residual[i] - state.link_masses.gravity_correction[i]
+    if state.arm.has_wrench != 0 and c.params.observer.cancel_tool_wrench != 0:
+        torque += dot(dynamics.J[:, i], state.arm.wrench_ee)
+    row = load_regressor_into(dynamics, gravity, i, stack_vector(4))
+    uncertainty, dry_friction = state.detection.model_uncertainty[i], c.params.arm.friction[i, 0]
+    identify_payload(payload, row, torque, uncertainty, dry_friction, dt, known_kg)
+    return load_sags(payload, c.output.error, dynamics.velocity, gravity, known_kg, dt)
+
+
+@inlined
+def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
+    """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; without c and g, (n,), N m."""
+    state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
+    arm, impedance, react, tool = state.arm, state.impedance, state.reaction, state.tool_wrench
+    n = arm.q.shape[0]
+    follow_gains(impedance, target, state.step.dt, params.impedance)
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     c.output.error[:] = error
-    F_spring = stiffness_wrench(
-        Lambda, error, state.K_task, params.task_acceleration_max_m_s2, params.task_acceleration_max_rad_s2
-    )
-    D_task = task_damping_into(state.K_task, state.D_task, params.loop_delay_s, stack_vector(6))
-    F_damping = damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
-    _limit_damping(c, D_task.max())
+    F_spring, F_damping = task_wrenches(impedance, Lambda, error, dynamics, params.clock.loop_delay_s, params.impedance)
+    set_joint_damping(impedance, state.mode, dynamics.M_inv, params)
     N_t = task_nullspace(dynamics.J, J_bar)
-    N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.direction)
-    tau_spring, tau_damping = stack_vector(n), stack_vector(n)
-    _posture_into(c, tau_spring, tau_damping)
-    of_task, of_posture = stack_vector(n), stack_vector(n)
-    pull = matvec_t_into(dynamics.J, F_spring, of_task) + matvec_t_into(N_ct, tau_spring, of_posture)
-    damping = matvec_t_into(dynamics.J, F_damping, of_task) + matvec_t_into(N_ct, tau_damping, of_posture)
-    observer_step(state.tool_force, state.step.probe_gain, _tool_force_into(c, J_bar, stack_vector(6)))
-    share = tool_share(F_spring, state.tool_force, params.tool_contact_n, params.tool_force_limit_n)
-    reason = LIMITED_BY_TOOL_FORCE if share < 1.0 else 0
+    N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.isolation.direction)
+    reaction.follow_posture_scale(react, state.mode, state.step.recover_gain, params.reaction)
+    elastic_posture, damping_posture = stack_vector(n), stack_vector(n)
+    posture_torques_into(
+        impedance, arm, target.q_posture, react.posture_scale, params, elastic_posture, damping_posture
+    )
+    elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
+    damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
+    follow_tool_force(tool, arm, state.observer.residual_fast, J_bar, state.step.probe_gain)
+    scale, reason = reaction.tool_task_scale(
+        F_spring, tool.force, params.classification.tool_contact_n, params.reaction.tool_force_limit_n
+    )
     if state.mode == FREE:
-        c.output.push_nm, c.output.push_limit_nm = 0.0, math.inf
-        _follow_scale(state, params, share, reason)
-        tau = state.task_scale * pull + damping + state.unweighed
-    else:
-        F_arm = matvec_t_into(J_bar, state.arm_torque, stack_vector(6))
-        disturbance = matvec_t_into(dynamics.J, F_arm, of_task)
-        tau = _contact_law(c, pull, damping, disturbance, N_t - N_ct, share, reason)
-    return tau + dynamics.c + dynamics.g
+        c.output.contact_command_nm, c.output.contact_limit_nm = 0.0, math.inf
+        reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
+        return react.task_scale * elastic + damping - state.link_masses.gravity_correction
+    compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
+    return _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
 
 
-@compiled
-def _limit_damping(c, D_task):
-    """Give every joint the share of its dampers that its inertia takes beside a damping of the task, 1/s."""
-    state, params = c.state, c.params
-    state.task_damping = D_task
-    joint_damping_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
-    state.joint_damping[:] = params.D_posture
-    if state.mode != FREE:
-        for i in range(state.joint_damping.shape[0]):
-            state.joint_damping[i] = max(params.D_posture[i], params.null_damping) + params.contact_damping
-    if (state.joint_damping > state.damping_limit).any():
-        loosen_limits(c.dynamics.M_inv, params.damping_rate - D_task, state.damping_limit)
-    scale_damping_into(state.joint_damping, state.damping_limit, state.damping_scale)
-    for i in range(state.joint_damping.shape[0]):
-        state.joint_damping[i] *= state.damping_scale[i]
+@inlined
+def _contact_law(
+    c: Record, elastic: Vector, damping: Vector, compensation: Vector, N_removed: Matrix, scale: float, reason: int
+) -> Vector:
+    """Bound the commanded contact force: by compensation, task scale and, last, damping; then damp the approach.
 
+    Args:
+        c: `controller_dtype` record.
+        elastic, damping, compensation: torques of the impedance and of (18), (n,), N m; the latter two are changed.
+        N_removed: null-space direction that the contact takes out, (n, n).
+        scale, reason: task scale that the tool allows.
 
-@compiled
-def _posture_into(c, tau_spring, tau_damping):
-    """Fill what pulls to the posture and what damps it, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m."""
-    state, params = c.state, c.params
-    _follow_posture(state, params)
-    for i in range(tau_spring.shape[0]):
-        tau_spring[i] = state.target.q_posture[i] - state.q[i]
-    shorten(tau_spring, params.posture_error_max_rad)
-    for i in range(tau_spring.shape[0]):
-        D = state.damping_scale[i] * params.D_posture[i]
-        tau_spring[i] *= state.posture_scale * min(params.K_posture[i], D / (2.0 * params.loop_delay_s))
-        tau_damping[i] = -D * state.qd[i]
-
-
-@compiled
-def _tool_force_into(c, J_bar, wrench):
-    """Force of the environment on the tool, (3,), N: measured, or without a sensor what the residual says, J#ᵀ r."""
-    if c.state.has_wrench != 0:
-        wrench[:] = c.state.wrench_ee
-    else:
-        matvec_t_into(J_bar, c.state.residual_fast, wrench)
-    return wrench[:3]
-
-
-@compiled
-def _follow_scale(state, params, wanted, reason):
-    """Let the task's share fall at once and come back slowly, fast where something pushes the arm; say what took it."""
-    if wanted < state.task_scale:
-        state.task_scale, state.scale_reason = wanted, reason
-    else:
-        back = state.step.recover_gain if state.holding == 0 else state.step.reject_recover_gain
-        state.task_scale += back * (wanted - state.task_scale)
-    if state.task_scale > _WHOLE:
-        state.scale_reason = reason
-
-
-@compiled
-def _follow_posture(state, params):
-    """Let the posture's stiffness go in contact and come back slowly: (21) alone gives it back at once."""
-    if state.mode == FREE:
-        state.posture_scale += state.step.recover_gain * (1.0 - state.posture_scale)
-    else:
-        state.posture_scale = params.posture_in_contact
-
-
-@compiled
-def _contact_law(c, pull, damping, task_disturbance, removed, share, reason):
-    """Jᵀ (F − J#ᵀ residual) + N_ctᵀ Γ_pose, (18), (21), (22), and what keeps it gentle.
-
-    Damping stays in the null-space direction that the contact takes out and in all joints; motion into an obstacle is
-    braked along the contact's direction; and the command never pushes along it harder than the bound in force: first
-    the compensation gives way, then the pull of the task as a whole, last the damping.
+    Returns:
+        Command less c and g, (n,), N m.
     """
-    state, params = c.state, c.params
-    qd, direction, M_inv = c.state.qd, c.state.direction, c.dynamics.M_inv
-    limit = _push_limit(c)
-    n = qd.shape[0]
-    shared, in_null = stack_vector(n), stack_vector(n)
-    for i in range(n):
-        shared[i] = state.damping_scale[i] * qd[i]
-    matvec_t_into(removed, shared, in_null)
-    for i in range(n):
-        damping[i] -= params.null_damping * in_null[i]
-        damping[i] -= params.contact_damping * state.damping_scale[i] * qd[i]
-    compensation = -task_disturbance
-    push = push_along(direction, M_inv, compensation)
-    if push > limit:
-        compensation *= limit / push
-    left = limit - max(min(push, limit), 0.0)
-    pull_push = push_along(direction, M_inv, pull)
-    if pull_push > 0.0 and left / pull_push < share:
-        share, reason = left / pull_push, LIMITED_BY_CONTACT
-    _follow_scale(state, params, share, reason)
-    tau = state.task_scale * pull + compensation + damping + state.unweighed
-    c.output.push_nm, c.output.push_limit_nm = push + pull_push, limit
-    push = push_along(direction, M_inv, tau)
-    if push > limit:
-        tau += (push - limit) * direction
-    if state.holding == 0:
+    state, params, react, impedance = c.state, c.params.reaction, c.state.reaction, c.state.impedance
+    qd, direction, M_inv = state.arm.qd, state.isolation.direction, c.dynamics.M_inv
+    limit = reaction.contact_limit(react, state.isolation, params)
+    reaction.damp_contact(damping, N_removed, qd, impedance.damping_scale, params)
+    compensated = reaction.bound_compensation(compensation, direction, M_inv, limit)
+    left = limit - max(min(compensated, limit), 0.0)
+    asked = torque_against_contact(direction, M_inv, elastic)
+    scale, reason = reaction.scale_of_task(asked, left, scale, reason)
+    reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
+    tau = react.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
+    c.output.contact_command_nm, c.output.contact_limit_nm = compensated + asked, limit
+    reaction.remove_excess(tau, direction, M_inv, limit)
+    if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
-        approach = min(dot(direction, qd), 0.0)
-        if approach < 0.0 and params.approach_damping > 0.0:
-            most = braking_limit(direction, c.dynamics.M, state.joint_damping, params.braking_rate - state.task_damping)
-            tau -= min(params.approach_damping, most) * approach * direction
+        rate = c.params.limits.braking_rate - impedance.task_damping
+        reaction.damp_approach(tau, direction, qd, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping)
     return tau
 
 
-@compiled
-def _push_limit(c):
-    """Bound in force, N m: a torque, and what a force limit comes to with the lever arm that the link suggests."""
-    params, state = c.params, c.state
-    gentle = min(params.contact_torque_limit_comply_nm, params.contact_force_limit_comply_n * state.lever)
-    firm = max(
-        state.meet_n * state.lever_most, min(state.hold_nm, params.contact_force_limit_reject_n * state.lever_most)
-    )
-    return max(gentle, min(firm, params.contact_torque_limit_reject_nm))
-
-
-@compiled
-def _refuse_unusable(state, tau):
-    """Repeat the last command where a law gave none that is finite."""
-    if not all_usable(tau):
-        _latch(state, NO_TORQUE)
-        tau[:] = state.tau
-
-
-@compiled
-def _stop_joints(c, tau_net, speed, ahead):
-    """Keep joints in their range and below their speed limits, in place; tell whether that took anything."""
-    state, dynamics, params = c.state, c.dynamics, c.params
-    q, qd = state.q, state.qd
-    n = q.shape[0]
-    excess, intrusion = stack_vector(n), stack_vector(n)
-    if not joint_excess(
-        q, qd, speed, ahead, params.q_min, params.q_max, params.qd_max, params.joint_margin, params.joint_deceleration,
-        excess, intrusion,
-    ):  # fmt: skip
-        return False
-    brake, spring, drag = stack_vector(n), stack_vector(n), stack_vector(n)
-    rate = params.braking_rate - state.task_damping
-    joint_stop_gains(
-        dynamics.M, state.joint_damping, rate, excess, intrusion, params.joint_brake,
-        params.joint_stop_stiffness, params.loop_delay_s, brake, spring, drag,
-    )  # fmt: skip
-    joint_stop_torque(tau_net, dynamics.M_inv, qd, excess, intrusion, params.joint_margin, brake, spring, drag)
-    return True
-
-
-@compiled
-def _slow_down(c, tau, speed):
-    """Brake the whole arm in place of the command as far as it is too fast; tell whether that took anything.
-
-    Where it has run away nothing but that is left to do.
-    """
-    state, dynamics, params = c.state, c.dynamics, c.params
-    share = 1.0
-    if state.runaway == 0:
-        share = braking_fraction(state.qd, speed, dynamics.c, params.runaway_speed, params.tau_max)
-    if share == 0.0:
-        return False
-    brake, torque_rate = stack_vector(tau.shape[0]), params.torque_step / params.dt
-    brake_into(dynamics.M, dynamics.M_inv, state.qd, params.tau_max, torque_rate, params.damping_rate, brake)
-    for i in range(tau.shape[0]):
-        tau[i] += share * (brake[i] + dynamics.c[i] - tau[i])
-    return True
-
-
-@compiled
-def _finish(c, tau):
-    """Add friction compensation and joint stops, apply the limits, remember and report."""
-    state, dynamics, params, out = c.state, c.dynamics, c.params, c.output
-    qd, step = state.qd, state.step
-    _refuse_unusable(state, tau)
-    limited_by = state.scale_reason if state.task_scale < 1.0 else 0
-    if state.loaded != 0 and state.task_scale < _WHOLE:
+@inlined
+def _send(c: Record, tau: Vector) -> None:
+    """Limit the command, given without c and g; remember it and report."""
+    state, dynamics, out = c.state, c.dynamics, c.output
+    scaled = state.reaction.task_scale
+    limited_by = state.reaction.scale_reason if scaled < 1.0 else 0
+    if state.payload.is_load != 0 and scaled < reaction.WHOLE:
         limited_by |= LIMITED_BY_LOAD
-    # Joints are stopped from what the motors can do, not from what is wanted of them.
-    clipped = limit_torque(tau, state.tau, params.tau_max, math.inf, dynamics.M_inv)
-    tau -= dynamics.g + dynamics.c
-    dt, speed, ahead = max(step.dt, params.dt), stack_vector(tau.shape[0]), stack_vector(tau.shape[0])
-    predict_velocity(qd, dynamics.M_inv, state.momentum_rate, params.torque_step, dt, speed, ahead)
-    if _stop_joints(c, tau, speed, ahead):
-        limited_by |= LIMITED_BY_RANGE
-    tau += dynamics.c
-    if power_limit(tau, dynamics.M, qd, state.tank_j, params.tank_power_w, params.tank_s):
-        limited_by |= LIMITED_BY_ENERGY
-    if _slow_down(c, tau, speed):
-        limited_by |= LIMITED_BY_RANGE
-    tau += dynamics.g
-    state.friction[:] = 0.0
-    if params.friction_compensation != 0:
-        tau += joint_friction_into(params.friction, qd, state.friction)
-    _refuse_unusable(state, tau)
-    clipped = limit_torque(tau, state.tau, params.tau_max, step.torque_step, dynamics.M_inv) or clipped
-    out.limited_by = limited_by | LIMITED_BY_RATE if clipped else limited_by
-    state.tau[:] = tau
-    given = dot(tau - state.friction - dynamics.g, qd)
-    state.tank_j = min(state.tank_j + step.dt * (params.tank_power_w - given), params.tank_j)
+    met, finite = limit_command(c, tau)
+    if not finite:
+        latch(state, NO_TORQUE)
+    out.limited_by = limited_by | met
+    state.command.tau[:] = tau
+    fill_tank(state.limits, state.command, dynamics.g, state.arm.qd, state.step.dt, c.params.limits)
     out.torque[:] = tau
-    out.residual[:] = state.residual
-    out.residual_fast[:] = state.residual_fast
+    out.residual[:] = state.observer.residual
+    out.residual_fast[:] = state.observer.residual_fast
     out.position[:] = dynamics.position
     out.rotation[:] = dynamics.rotation
     out.velocity[:] = dynamics.velocity
-    out.mode, out.holding, out.fault = state.mode, state.holding, state.fault
-    out.target_late = state.target_late
-    out.braked = 1 if state.braking != 0 or state.runaway != 0 else 0
+    out.mode, out.fault = state.mode, state.fault
+    out.kind = contact_kind(state.mode, state.tool_wrench.force, c.params.classification.tool_contact_n)
+    out.target_late = state.clock.target_late
+    out.braked = 1 if state.clock.braking != 0 or state.limits.runaway != 0 else 0

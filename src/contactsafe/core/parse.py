@@ -37,39 +37,50 @@ _PLAINER: dict[str, str | Callable[[re.Match], str]] = {
 """What tyro says, and how it is said here."""
 
 
-def one_of(names: Collection[str]) -> PrimitiveConstructorSpec:
+def one_of(names: Collection[str], check: Callable[[str], Any] | None = None) -> PrimitiveConstructorSpec:
     """Say in `Annotated` of a text that it is one of some names: help lists them, and no other passes.
 
     Args:
         names: all there are, from where they are defined; those that are added later pass too.
+        check: raises ValueError for a text that does not pass, where a name may have more behind it; None for names.
     """
     known = names
     return PrimitiveConstructorSpec(
         nargs=1,
         metavar=f"{{{','.join(known)}}}",
-        instance_from_str=lambda words: _known(words[0], known),
-        is_instance=lambda value: value is None or value in known,
+        instance_from_str=lambda words: _checked(words[0], known, check),
+        is_instance=lambda value: value is None or value in known or (check is not None and isinstance(value, str)),
         str_from_instance=lambda value: [str(value)],
     )
 
 
-def some_of(names: Iterable[str], separator: str = ",") -> PrimitiveConstructorSpec:
+def some_of(
+    names: Iterable[str], separator: str = ",", check: Callable[[str], Any] | None = None
+) -> PrimitiveConstructorSpec:
     """Say of a tuple that it holds some of some names; see `one_of`.
 
     Args:
         names: all there are, from where they are defined.
         separator: what stands between them on the command line, a comma or a space.
+        check: as of `one_of`.
     """
     known = tuple(names)
     return PrimitiveConstructorSpec(
         nargs="*" if separator == " " else 1,
         metavar=f"{{{','.join(known)}}}{separator.strip() or ' '}...",
         instance_from_str=lambda words: tuple(
-            _known(name.strip(), known) for name in separator.join(words).split(separator)
+            _checked(name.strip(), known, check) for name in separator.join(words).split(separator)
         ),
-        is_instance=lambda value: isinstance(value, tuple) and set(value) <= set(known),
+        is_instance=lambda value: isinstance(value, tuple) and (check is not None or set(value) <= set(known)),
         str_from_instance=lambda value: list(value) if separator == " " else [separator.join(value)],
     )
+
+
+def _checked(name: str, known: Collection[str], check: Callable[[str], Any] | None) -> str:
+    if check is None:
+        return _known(name, known)
+    check(name)
+    return name
 
 
 def _known(name: str, known: Collection[str]) -> str:
@@ -78,14 +89,13 @@ def _known(name: str, known: Collection[str]) -> str:
     return name
 
 
-def parse(what: Callable, program: str, words: Sequence[str], description: str | None = None, **options: Any) -> Any:
+def parse(what: Callable, program: str, words: Sequence[str], **options: Any) -> Any:
     """Turn words into what a dataclass or a function's arguments ask for.
 
     Args:
         what: dataclass to make, or function to call with what was said.
         program: how the command is called, for help and messages.
         words: after it.
-        description: what help says first; None for the docstring.
         options: of `tyro.cli`.
 
     Raises:
@@ -100,7 +110,7 @@ def parse(what: Callable, program: str, words: Sequence[str], description: str |
                 what,
                 prog=program,
                 args=list(words),
-                description=_description(docstring(what) if description is None else description),
+                description=_description(docstring(what)),
                 config=(tyro.conf.DisallowNone,),
                 **options,
             )
@@ -152,7 +162,7 @@ def _description(text: str) -> str:
 
 
 def _parts(what: Any) -> Iterator[Any]:
-    """Yield the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
+    """Give the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
     for kind in getattr(what, "__mro__", ()):
         if dataclasses.is_dataclass(kind):
             yield kind

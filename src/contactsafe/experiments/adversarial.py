@@ -127,7 +127,7 @@ def limit_metrics(trace: np.ndarray, arm: Arm, controller: ControllerConfig) -> 
     torque, q = trace["torque"], trace["q"]
     steps = np.abs(np.diff(torque, axis=0))
     given = -np.cumsum(np.einsum("ti,ti->t", trace["tau_arm"][:-1], np.diff(q, axis=0)))
-    allowed = controller.tank_j + controller.tank_power_w * trace["time"][1:]
+    allowed = controller.limits.tank_j + controller.limits.tank_power_w * trace["time"][1:]
     beyond = np.maximum(arm.q_min - q, q - arm.q_max)
     return {
         "not_finite": float(np.count_nonzero(~np.isfinite(torque))),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.control import presets
+from contactsafe.control.codes import FREE
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.experiments.clock_cases import CASES, SITUATIONS, Case, Scene, heading, sample_scene
@@ -140,7 +141,9 @@ def clock_metrics(trace: np.ndarray, calm: np.ndarray, scene: Scene, case: Case)
     led = not case.stops and case.silent_s == 0.0
     touched = bool(scene.obstacles)
     return {
-        "false_contact_ms": np.nan if touched else float(np.count_nonzero((trace["mode"] == 1) & (calm["mode"] == 0))),
+        "false_contact_ms": np.nan
+        if touched
+        else float(np.count_nonzero((trace["mode"] != FREE) & (calm["mode"] == FREE))),
         "torque_step_nm": float(np.abs(np.diff(trace["torque"], axis=0)).max()),
         "tool_away_mm": float(1000.0 * away.max()) if led else np.nan,
         "tool_travel_mm": np.nan if led else float(1000.0 * np.linalg.norm(after - after[0], axis=1).max()),

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from contactsafe.control import presets
+from contactsafe.control.codes import COMPLY, FREE, REJECT
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_scenes import Meeting, Motion, sample_meetings, sample_motion
@@ -46,7 +47,7 @@ CURVES = Figure(
     plots=(
         (
             Panel("contact force", "N", scalar("obstacle_force")),
-            Panel("mode: 0 free, 1 comply, 2 reject", "", lambda run: run.trace["mode"] * (1.0 + run.trace["holding"])),
+            Panel("mode: 0 free, 1 comply, 2 reject", "", lambda run: run.trace["mode"]),
             Panel("tool away from its free motion", "mm", length("error", 1000.0)),
         ),
     ),
@@ -246,7 +247,6 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
     tau = np.abs(trace["tau_arm"]).max(axis=1)
     away = np.linalg.norm(trace["position"] - free["position"], axis=1)
     at_limit = ((trace["q"] < arm.q_min + _AT_LIMIT_RAD) | (trace["q"] > arm.q_max - _AT_LIMIT_RAD)).any(axis=1)
-    contact = trace["mode"] == 1
     first = int(np.argmax(touching))
     reported = trace["link"][first:] > 0
     return {
@@ -260,8 +260,8 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
         "tool_error_mm": float(1000.0 * away.max()),
         "tool_error_end_mm": float(1000.0 * away[-1]),
         "tool_force_peak_n": float(np.linalg.norm(trace["tool_force"], axis=1).max()),
-        "comply_fraction": float((contact & (trace["holding"] == 0)).mean()),
-        "reject_fraction": float((contact & (trace["holding"] == 1)).mean()),
-        "mode_switches": float(np.count_nonzero(np.diff(trace["mode"]))),
+        "comply_fraction": float((trace["mode"] == COMPLY).mean()),
+        "reject_fraction": float((trace["mode"] == REJECT).mean()),
+        "mode_switches": float(np.count_nonzero(np.diff(trace["mode"] != FREE))),
         "limit_touches": float(np.count_nonzero(np.diff(at_limit.astype(int)) > 0)),
     }

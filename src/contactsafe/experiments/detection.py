@@ -70,7 +70,7 @@ def reporting(names: Sequence[str]) -> dict[str, ControllerConfig]:
         InvalidInputError: there is none among them.
     """
     known = {name: presets.by_name(name) for name in names}
-    found = {name: controller for name, controller in known.items() if controller.contact_aware}
+    found = {name: controller for name, controller in known.items() if controller.reaction.contact_aware}
     if not found:
         raise InvalidInputError(f"none of {', '.join(names)} reports contacts; choose paper or safe")
     return found

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactsafe.control import codes
 from contactsafe.control.config import ControllerConfig
 from contactsafe.experiments.collision_scenes import Motion, sample_motion
 from contactsafe.experiments.motions import Playback
@@ -55,17 +56,17 @@ def false_alarm_trials(arm: Arm, name: str, controller: ControllerConfig, stroke
     n, seeds = len(strokes), [stroke.seed for stroke in strokes]
     worlds = Worlds(arm, [stroke.world((), real=True) for stroke in strokes], controller, n, seeds)
     play, steps = Playback(worlds, strokes), np.zeros((n, MAX_TICKS), dtype=trace_dtype(arm.n))
-    mode, untouched = np.zeros((n, 1), int), np.ones(n, bool)
+    before, untouched = np.zeros((n, 1), int), np.ones(n, bool)
     entries, lasting, watched = np.zeros(n), np.zeros(n), np.zeros(n)
     while play.running.any():
         ticks = play.step(steps)
         now = steps[:, :ticks]
         untouched &= np.abs(now["tau_arm"]).max(axis=(1, 2)) <= _TOUCHED_NM
-        modes = np.concatenate([mode, now["mode"]], axis=1)
-        entries += untouched * np.count_nonzero(np.diff(modes) > 0, axis=1)
-        lasting += untouched * (now["mode"] == 1).sum(axis=1)
+        contact = np.concatenate([before, now["mode"] != codes.FREE], axis=1)
+        entries += untouched * np.count_nonzero(np.diff(contact) > 0, axis=1)
+        lasting += untouched * contact[:, 1:].sum(axis=1)
         watched += untouched * ticks
-        mode = modes[:, -1:]
+        before = contact[:, -1:]
     worlds.close()
     return [
         Trial(

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.run import policy_for, run_policy, steps_in
@@ -163,7 +164,7 @@ def contact_metrics(trace: np.ndarray) -> dict[str, float]:
     tau, residual = np.abs(trace["tau_arm"]).max(axis=1), np.abs(trace["residual"]).max(axis=1)
     reported = trace["link"][int(np.argmax(touching)) :] > 0
     detect = float(np.argmax(reported)) if reported.any() and not reported[0] else float("nan")
-    switches = int(np.count_nonzero(np.diff(trace["mode"])))
+    switches = int(np.count_nonzero(np.diff(trace["mode"] != FREE)))
     values = (
         force.max(), force[steady].mean(), force.sum() / 1000.0, tau.max(), tau[steady].mean(), residual.max(),
         residual[steady].mean(), detect, np.linalg.norm(trace["tool_force"], axis=1).max(), switches,

@@ -66,7 +66,7 @@ def _run_late(
             sense(world, controller, noise[i, k])
             code = codes[i, world.tick]
             controller.measurement.has_time = 1 if timed else 0
-            controller.measurement.time = world.tick * controller.params.dt
+            controller.measurement.time = world.tick * controller.params.clock.dt
             _corrupt(controller.measurement, code, held[i])
             if code != NO_CALL:
                 control_tick(controller)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.control.config import ControllerConfig
 from contactsafe.experiments.collision_scenes import sample_motion, scene_rng
 from contactsafe.experiments.motions import Playback
@@ -130,7 +131,7 @@ def step_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
         trace: `trace_dtype` records from the onset on, (T,).
         push: what was done.
     """
-    reported = trace["mode"] == 1
+    reported = trace["mode"] != FREE
     after_ms = float(np.argmax(reported)) if reported.any() else math.nan
     early = bool(reported[0])
     return {
@@ -146,7 +147,7 @@ def step_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
 def contact_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
     """Return which link was named `NAMED_AFTER_MS` after the onset; arguments as for `step_metrics`."""
     named = int(trace["link"][NAMED_AFTER_MS])
-    early = bool(trace["mode"][0] == 1)
+    early = bool(trace["mode"][0] != FREE)
     return {
         "link": float(push.link),
         "force_n": float(np.linalg.norm(push.force)),

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.run import policy_for, run_policy
 from contactsafe.results.experiment import Experiment, Trial
@@ -113,7 +114,7 @@ def force_metrics(trace: np.ndarray) -> dict[str, float]:
         "damping_z_free": _mean(trace["D_task"][~touching, _Z]),
         "damping_z_contact": _mean(trace["D_task"][touching, _Z]),
         "tool_force_p95_n": float(np.percentile(force[touching], 95)) if touching.any() else float("nan"),
-        "contact_mode_fraction": float(trace["mode"].mean()),
+        "contact_mode_fraction": float((trace["mode"] != FREE).mean()),
     }
 
 

@@ -59,7 +59,7 @@
       return {
         q: Array.from(v.subarray(0, n), (x) => x * u.q),
         obstacle: Array.from(v.subarray(n, n + 3), (x) => x * u.position),
-        force: v[n + 3] * u.force, mode: v[n + 4], rejects: v[n + 5], link: v[n + 6],
+        force: v[n + 3] * u.force, mode: v[n + 4], link: v[n + 5],
       };
     }
     force(frame) {
@@ -125,7 +125,7 @@
       this.drawSpark(time, style);
       this.bar.style.width = `${Math.min(100, (100 * now.force) / this.scene.limit)}%`;
       this.value.textContent = `${now.force.toFixed(now.force < 9.95 ? 1 : 0)} N`;
-      const names = now.rejects ? "rejects" : "complies with";
+      const names = now.mode === 2 ? "rejects" : "complies with";
       this.state.textContent = now.mode ? `${names} contact, link ${now.link || "–"}` : "free-space law";
       this.state.classList.toggle("on", now.mode !== 0);
     }

@@ -86,7 +86,6 @@ def _run(recording: Recording, of_obstacle: bool) -> dict:
             trace["obstacle_position"][ticks, 0] / POSITION_UNIT,
             forces / FORCE_UNIT,
             trace["mode"][ticks],
-            trace["holding"][ticks],
             trace["link"][ticks],
         ]
     )

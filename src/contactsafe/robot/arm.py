@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
@@ -89,7 +90,7 @@ class Arm(Independent):
     surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
@@ -108,7 +109,7 @@ class Arm(Independent):
 
         Args:
             model: of the scene.
-            tick_s: the controller's tick, `ControllerConfig.dt`, s.
+            tick_s: the controller's tick, `ControllerConfig.clock.dt`, s.
 
         Raises:
             InvalidInputError: a joint is missing, has not exactly one motor, or the timestep does not divide the tick.
@@ -120,7 +121,7 @@ class Arm(Independent):
         """Make a copy of the nominal model for one controller or one thread."""
         return NominalModel(self.model, self.site, self.surface, self.lever_doubted)
 
-    def joint_vector(self, value, name: str) -> np.ndarray:
+    def joint_vector(self, value: ArrayLike, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.
 
         Args:
@@ -135,15 +136,15 @@ class Arm(Independent):
         """
         return finite_array(value, (self.n,), name)
 
-    def tool_pose(self, q) -> Pose:
-        """Give the tool's pose at joint positions q (n,), rad."""
+    def tool_pose(self, q: ArrayLike) -> Pose:
+        """Return the tool's pose at joint positions q (n,), rad."""
         q = self.joint_vector(q, "q")
         position, rotation, J = np.zeros(3), np.zeros((3, 3)), np.zeros((6, self.n))
         nominal = self.nominal()  # named, so that it outlives the call: the handle is but an address
         forward_kinematics(nominal.handle, q, position, rotation, J)
         return Pose(position, matrix_to_quat(rotation))
 
-    def dynamics(self, q, qd) -> np.void:
+    def dynamics(self, q: ArrayLike, qd: ArrayLike) -> np.void:
         """Evaluate the nominal dynamics at q (n,) rad, qd (n,) rad/s; a `dynamics_dtype` record."""
         out = np.zeros(1, dtype=dynamics_dtype(self.n))
         nominal = self.nominal()
@@ -151,7 +152,7 @@ class Arm(Independent):
         return out[0]
 
 
-def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
+def finite_array(value: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndarray:
     """Check an array at the door: its shape, and that every number is finite.
 
     Raises:
@@ -166,7 +167,7 @@ def finite_array(value, shape: tuple[int, ...], name: str) -> np.ndarray:
 
 
 def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Give a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
+    """Return a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
     return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
 
 

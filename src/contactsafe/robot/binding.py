@@ -1,6 +1,6 @@
 """Where an arm's joints and motors are in a MuJoCo model that holds other things too."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -50,7 +50,7 @@ def bind_joints(names: Sequence[str], model: mujoco.MjModel, tick_s: float) -> B
 
 
 def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Give the number of a named thing.
+    """Return the number of a named thing.
 
     Raises:
         InvalidInputError: there is none of that name.
@@ -70,11 +70,11 @@ def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
     return f"'{name}'" if name else f"{number} (without a name)"
 
 
-def listed(names) -> str:
+def listed(names: Iterable[object]) -> str:
     """Write names for a message, the first dozen of them."""
-    names = list(names)
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more or "none"
+    words = [str(name) for name in names]
+    more = f" and {len(words) - _LISTED} more" if len(words) > _LISTED else ""
+    return ", ".join(words[:_LISTED]) + more or "none"
 
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
@@ -96,7 +96,7 @@ def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
 
 
 def torque_per_control(model: mujoco.MjModel, actuator: int) -> float:
-    """Give the joint torque of one unit of control, N m; 0 where the actuator is no motor, whose torque that is."""
+    """Return the joint torque of one unit of control, N m; 0 where the actuator is no motor, whose torque that is."""
     is_motor = (
         model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
         and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_matrix
 from contactsafe.robot.arm import Arm
@@ -41,7 +42,7 @@ def chain_of(arm: Arm) -> Chain:
 
 
 @compiled
-def chain_kinematics(chain, q, position, rotation, J):
+def chain_kinematics(chain: Chain, q: Vector, position: Vector, rotation: Matrix, J: Matrix) -> None:
     """Place the arm at q (n,) and fill the tool point (3,), its axes (3, 3) and its Jacobian (6, n), linear rows first.
 
     Joint by joint x ↦ R x + p carries what lies beyond from where it is at q = 0; rows of R exp([w] q) by Rodrigues.

@@ -9,6 +9,7 @@ import functools
 import mujoco
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross_into, dot, matvec_into, spd_inverse
 from contactsafe.core.native import (
@@ -91,7 +92,7 @@ def make_handle(
 
 
 @compiled
-def _set_configuration(handle, q):
+def _set_configuration(handle: Record, q: Vector) -> None:
     qpos = view1(handle.qpos, q.shape[0])
     for i in range(q.shape[0]):
         qpos[i] = q[i]
@@ -100,7 +101,7 @@ def _set_configuration(handle, q):
 
 
 @compiled(nogil=True)
-def forward_kinematics(handle, q, position, rotation, J):
+def forward_kinematics(handle: Record, q: Vector, position: Vector, rotation: Matrix, J: Matrix) -> None:
     """Place the arm at q (n,) and fill the tool point (3,), its axes (3, 3) and its Jacobian (6, n)."""
     _set_configuration(handle, q)
     _tool_frame(handle, position, rotation)
@@ -108,7 +109,7 @@ def forward_kinematics(handle, q, position, rotation, J):
 
 
 @compiled
-def _tool_frame(handle, position, rotation):
+def _tool_frame(handle: Record, position: Vector, rotation: Matrix) -> None:
     site_xpos = view2(handle.site_xpos, handle.site + 1, 3)
     site_xmat = view2(handle.site_xmat, handle.site + 1, 9)
     for i in range(3):
@@ -118,12 +119,12 @@ def _tool_frame(handle, position, rotation):
 
 
 @compiled
-def _tool_jacobian(handle, J):
+def _tool_jacobian(handle: Record, J: Matrix) -> None:
     mj_jacSite(handle.model, handle.data, J[:3].ctypes, J[3:].ctypes, handle.site)
 
 
 @compiled
-def _gravity(handle, n, g):
+def _gravity(handle: Record, n: int, g: Vector) -> None:
     """g_i = −axis_i · ((com of all beyond joint i − anchor_i) × their weight)."""
     subtree_com = view2(handle.subtree_com, handle.nbody, 3)
     subtree_mass = view1(handle.body_subtreemass, handle.nbody)
@@ -140,7 +141,7 @@ def _gravity(handle, n, g):
 
 
 @compiled
-def mass_regressor(handle, out):
+def mass_regressor(handle: Record, out: Matrix) -> None:
     """Fill the gravity torque of each joint per relative error of each link's mass, (n, n + 1), N m.
 
     The last column is of what the last link carries as bodies of its own: the tool. The handle must have been brought
@@ -162,7 +163,7 @@ def mass_regressor(handle, out):
 
 
 @compiled
-def _inertia_times(cinert, v, out):
+def _inertia_times(cinert: Vector, v: Vector, out: Vector) -> None:
     """Add I v for MuJoCo's packed spatial inertia (xx yy zz xy xz yz, m·r, m) and twist v (angular first)."""
     xx, yy, zz, xy, xz, yz = cinert[0], cinert[1], cinert[2], cinert[3], cinert[4], cinert[5]
     rx, ry, rz, mass = cinert[6], cinert[7], cinert[8], cinert[9]
@@ -175,7 +176,7 @@ def _inertia_times(cinert, v, out):
 
 
 @compiled
-def _coriolis_transpose(handle, n, CT_qd):
+def _coriolis_transpose(handle: Record, n: int, CT_qd: Vector) -> None:
     """(Cᵀ q̇)_i = Ṡ_i · h_i: rate of the joint's motion axis times the momentum of all beyond it.
 
     From Cᵀ q̇ = ½ ∂(q̇ᵀ M q̇)/∂q for Christoffel C: turning joint i carries everything beyond it rigidly, so only the
@@ -197,7 +198,7 @@ def _coriolis_transpose(handle, n, CT_qd):
 
 
 @compiled
-def _jacobian_rate(handle, n, out):
+def _jacobian_rate(handle: Record, n: int, out: Vector) -> None:
     """J̇ q̇ of the tool: Σ Ṡ_i q̇_i is spatial acceleration at the arm's centre of mass; moved to the tool point."""
     cdof_dot = view2(handle.cdof_dot, n, 6)
     qvel = view1(handle.qvel, n)
@@ -223,7 +224,7 @@ def _jacobian_rate(handle, n, out):
 
 
 @compiled(nogil=True)
-def update_dynamics(handle, q, qd, out):
+def update_dynamics(handle: Record, q: Vector, qd: Vector, out: Record) -> bool:
     """Fill a `dynamics_dtype` record for joint positions q (n,) rad and velocities qd (n,) rad/s.
 
     Returns:

@@ -4,17 +4,18 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 
 
 @compiled
-def joint_friction(parameters, qd):
-    """Give the torque that friction takes from each joint, (n,), N m; see `joint_friction_into`."""
+def joint_friction(parameters: Matrix, qd: Vector) -> Vector:
+    """Return the torque that friction takes from each joint, (n,), N m; see `joint_friction_into`."""
     return joint_friction_into(parameters, qd, np.empty(qd.shape[0]))
 
 
 @compiled
-def joint_friction_into(parameters, qd, out):
+def joint_friction_into(parameters: Matrix, qd: Vector, out: Vector) -> Vector:
     """Fill the torque that friction takes from each joint, and give it back.
 
     φ1/(1 + exp(−φ2 (q̇ + φ3))) − φ1/(1 + exp(−φ2 φ3)); Gaz et al. 2019, eq. (10).

@@ -2,9 +2,12 @@
 
 import math
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError, UnreachableError
@@ -25,8 +28,8 @@ _SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
 _STEP = 0.5  # largest change of one joint in one iteration, rad: the linearised arm is worth little beyond
 _DAMPING = 1e-6  # keeps the normal matrix invertible in a singularity; too small to be felt elsewhere
-_MARGIN = 0.1  # rad from a joint limit at which the pull off it begins
-_PULL = 0.2  # share of the missing margin that one iteration asks to win back
+_MARGIN = 0.1  # rad from a joint limit at which a step away from it begins
+_RECOVERY = 0.2  # fraction of the missing margin that one iteration asks to win back
 
 
 class InverseKinematics(Independent):
@@ -52,7 +55,7 @@ class InverseKinematics(Independent):
         self._posture(*anywhere)
 
     def posture(self, pose: Pose) -> np.ndarray:
-        """Give the posture of a pose: of the joint positions that reach it, the ones nearest home.
+        """Return the posture of a pose: of the joint positions that reach it, the ones nearest home.
 
         A function of the pose alone, to the bit, in bounded time; docs/concepts/posture.md says what is nearest and
         where a small change of the pose is a small change of the posture.
@@ -65,7 +68,7 @@ class InverseKinematics(Independent):
 
         Raises:
             InvalidInputError: wrong shape, not finite, or a quaternion that is not of unit length to 1e-3.
-            UnreachableError: out of reach, or only by a way that `solve` may find in longer time.
+            UnreachableError: out of reach, or only by a path that `solve` may find in longer time.
         """
         position, quat = _checked_pose(pose)
         q, reached = self._posture(position, quat)
@@ -76,8 +79,8 @@ class InverseKinematics(Independent):
             )
         return q
 
-    def posture_near(self, pose: Pose, q_seed) -> np.ndarray:
-        """Give `posture`, or where that rule finds none, joint positions reached straight from a seed.
+    def posture_near(self, pose: Pose, q_seed: ArrayLike) -> np.ndarray:
+        """Return `posture`, or where that rule finds none, joint positions reached straight from a seed.
 
         In bounded time as well: a target that is streamed over the workspace is followed through the places where no
         rule leads. There, and only there, the answer depends on the seed.
@@ -94,7 +97,7 @@ class InverseKinematics(Independent):
                 raise
             return q
 
-    def solve(self, pose: Pose, q_seed=None) -> np.ndarray:
+    def solve(self, pose: Pose, q_seed: ArrayLike | None = None) -> np.ndarray:
         """Find joint positions within the limits that put the tool at a pose, however long it takes.
 
         Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then `posture`; then home and other
@@ -180,7 +183,7 @@ def _reached(error: tuple[float, float]) -> bool:
     return error[0] <= POSITION_TOLERANCE and error[1] <= ROTATION_TOLERANCE
 
 
-def trac_ik(arm: Arm, timeout_s: float = 0.02):
+def trac_ik(arm: Arm, timeout_s: float = 0.02) -> Any:
     """Set up TRAC-IK (Beeson & Ames 2015, Speed mode) on the generated URDF, with the arm's limits.
 
     Args:
@@ -200,12 +203,14 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02):
 
 
 @compiled(nogil=True)
-def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
+def solve_ik(
+    handle: Record, position: Vector, quat: Vector, q_seed: Vector, q_min: Vector, q_max: Vector, q_out: Vector
+) -> tuple[float, float]:
     """Put the tool at a pose by damped least squares from a seed.
 
     Levenberg-Marquardt with damping that grows with the error (Sugihara 2011): far steps are short and
     singularities do no harm, near ones are Gauss-Newton. Each step is the smallest that serves, so the arm's redundant
-    motion stays where the seed left it, but for a pull off joint limits that are near.
+    motion stays where the seed left it, but for a step away from joint limits that are near.
 
     Args:
         handle: record of a nominal model that nobody else is using, `handle_dtype`.
@@ -244,13 +249,23 @@ def solve_ik(handle, position, quat, q_seed, q_min, q_max, q_out):
 
 
 @compiled
-def _limited_step(J, error, q, q_min, q_max, step, free, A, A_inv):
+def _limited_step(
+    J: Matrix,
+    error: Vector,
+    q: Vector,
+    q_min: Vector,
+    q_max: Vector,
+    step: Vector,
+    free: Vector,
+    A: Matrix,
+    A_inv: Matrix,
+) -> None:
     """Fill the step: joints that it would carry past a limit stop there, and the others make up for them."""
     n = q.shape[0]
     for i in range(n):
         free[i] = 1.0
         below, above = q_min[i] + _MARGIN - q[i], q[i] - (q_max[i] - _MARGIN)
-        step[i] = _PULL * (max(below, 0.0) - max(above, 0.0))
+        step[i] = _RECOVERY * (max(below, 0.0) - max(above, 0.0))
     wanted = step.copy()
     for _ in range(n):
         _damped_step(J, error, wanted, free, step, A, A_inv)
@@ -267,7 +282,9 @@ def _limited_step(J, error, q, q_min, q_max, step, free, A, A_inv):
 
 
 @compiled
-def _damped_step(J, error, wanted, free, step, A, A_inv):
+def _damped_step(
+    J: Matrix, error: Vector, wanted: Vector, free: Vector, step: Vector, A: Matrix, A_inv: Matrix
+) -> None:
     """Step = wanted + Jᵀ (J Jᵀ + λ 1)⁻¹ (error − J wanted), joints that are not free left as wanted; λ = ½ |error|²."""
     n = wanted.shape[0]
     damping = 0.5 * dot(error, error) + _DAMPING
@@ -289,7 +306,7 @@ def _damped_step(J, error, wanted, free, step, A, A_inv):
 
 
 @compiled
-def _shorten(step):
+def _shorten(step: Vector) -> None:
     largest = 0.0
     for i in range(step.shape[0]):
         largest = max(largest, abs(step[i]))

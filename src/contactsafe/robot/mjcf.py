@@ -1,6 +1,7 @@
 """MJCF generated from an arm's description: the same arm for the nominal model, the plant and the pictures."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 
 from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Tool
 
@@ -11,7 +12,7 @@ ARM_CONTYPE = 2
 """Collision type of the arm's geoms: they meet what has conaffinity 2, and never each other."""
 
 
-def numbers(values) -> str:
+def numbers(values: Iterable[float]) -> str:
     """Write numbers for an XML attribute so that they read back to the same floats."""
     return " ".join(repr(float(value)) for value in values)
 

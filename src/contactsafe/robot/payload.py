@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
@@ -31,7 +32,7 @@ _REACH_M = 1.0
 """Nothing that a tool holds is further from its point: what is said to be is a slip of units."""
 
 
-def checked_payload(mass, com=None, inertia=None) -> Payload:
+def checked_payload(mass: ArrayLike, com: ArrayLike | None = None, inertia: ArrayLike | None = None) -> Payload:
     """Check what a tool is said to carry.
 
     Args:
@@ -70,7 +71,7 @@ def checked_payload(mass, com=None, inertia=None) -> Payload:
 
 
 def carrying(arm: Arm, load: Payload) -> Arm:
-    """Give the arm with a payload joined rigidly to what carries its tool point."""
+    """Return the arm with a payload joined rigidly to what carries its tool point."""
     if load.mass == 0.0:
         return arm
     model = copy.deepcopy(arm.model)

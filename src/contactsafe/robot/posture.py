@@ -1,4 +1,4 @@
-"""The posture that goes with a tool pose: a function of the pose alone, whatever way led there.
+"""The posture that goes with a tool pose: a function of the pose alone, whatever path led there.
 
 Of all joint positions that put the tool at a pose, the one nearest home is taken; docs/concepts/posture.md derives it
 and says where that is continuous. Newton's method on the Lagrangian, from starts that know nothing but the pose.
@@ -9,12 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
-from contactsafe.core.linalg import cross_into, dot, spd_inverse
+from contactsafe.core.linalg import cross_into, dot
 from contactsafe.core.rotation import matrix_to_quat, matrix_to_quat_into
 from contactsafe.core.stack import stack_matrix, stack_vector
 from contactsafe.robot.arm import Arm, Pose, finite_range
 from contactsafe.robot.chain import Chain, chain_kinematics, chain_of
+from contactsafe.robot.posture_step import newton_step
 
 POSITION_TOLERANCE = 1e-4
 """A pose counts as reached within this, m."""
@@ -27,12 +29,11 @@ _OTHER_STARTS = 256  # postures of which the nearest are started from where home
 _TRIES = 2  # of them
 _ITERATIONS = 40  # of one start at most
 _PATIENCE = 3  # iterations with less than a fifth of the progress wanted after which a start is given up
-_WAY_M, _WAY_RAD = 0.06, 0.2  # by which one iteration moves the tool at most: the way from home is followed, not jumped
+_STRIDE_M, _STRIDE_RAD = 0.06, 0.2  # by which one iteration moves the tool at most: the path from home is followed
 _STEP = 0.3  # rad, by which one iteration moves a joint at most
-_ROOM = 0.8  # share of the way to a joint limit that one iteration may go
+_ROOM = 0.8  # fraction of the distance to a joint limit that one iteration may move
 _CONVERGED = 1e-6  # rad; Newton's method squares what is left, so the posture is exact to about 1e-11
-_LOST = 1e-3  # a task direction of less is as good as lost, m or rad per unit of the cost's root
-_INSIDE = 0.01  # a start is at least this share of the range away from a joint limit
+_INSIDE = 0.01  # a start is at least this fraction of the range away from a joint limit
 _NARROW = 1e-6  # rad; a joint of less range stays where home has it
 _ON_AXIS = 0.01  # m; nearer to the first axis, home has no azimuth
 
@@ -94,13 +95,13 @@ def _tool_pose(chain: Chain, q: np.ndarray) -> Pose:
 
 
 def _off_axis(chain: Chain, point: np.ndarray) -> np.ndarray:
-    """Give the part of a point, (3,), m, that is off the first joint's axis."""
+    """Return the part of a point, (3,), m, that is off the first joint's axis."""
     away = point - chain.anchors[0]
     return away - (away @ chain.axes[0]) * chain.axes[0]
 
 
 @compiled(nogil=True)
-def find_posture(rule, position, quat, q_out):
+def find_posture(rule: PostureRule, position: Vector, quat: Vector, q_out: Vector) -> tuple[float, float]:
     """Find the posture of a tool pose: of those that reach it the one nearest home, W least.
 
     W(q) = Σ ½ (q − q_home)² + b (h ln(h/t) + (1 − h) ln((1 − h)/(1 − t))), where t is how far through its range a joint
@@ -108,7 +109,7 @@ def find_posture(rule, position, quat, q_out):
     infinite at the joint limits (none where a joint turns without end). It is strictly convex.
 
     Its minimum on the pose is followed from home's pose to the one asked for: home, turned about the first axis to
-    where the pose is, then the straight way. Where that ends at a limit or at a fold, the nearest of other fixed
+    where the pose is, then straight on. Where that ends at a limit or at a fold, the nearest of other fixed
     postures are started from. Nothing is remembered between calls.
 
     Args:
@@ -135,7 +136,7 @@ def find_posture(rule, position, quat, q_out):
 
 
 @compiled
-def _try_others(rule, position, quat, q):
+def _try_others(rule: PostureRule, position: Vector, quat: Vector, q: Vector) -> tuple[float, float, bool]:
     """Start from the fixed postures that put the tool nearest to the pose; returns what `_follow` does."""
     away = stack_vector(rule.starts.shape[0])
     for k in range(away.shape[0]):
@@ -144,7 +145,7 @@ def _try_others(rule, position, quat, q):
             square += (position[a] - rule.start_positions[k, a]) ** 2
         for a in range(4):
             cosine += quat[a] * rule.start_quats[k, a]
-        away[k] = math.sqrt(square) / _WAY_M + math.sqrt(max(8.0 - 8.0 * abs(cosine), 0.0)) / _WAY_RAD
+        away[k] = math.sqrt(square) / _STRIDE_M + math.sqrt(max(8.0 - 8.0 * abs(cosine), 0.0)) / _STRIDE_RAD
     position_error, rotation_error, reached = math.inf, math.inf, False
     for _ in range(_TRIES):
         nearest = 0
@@ -160,7 +161,7 @@ def _try_others(rule, position, quat, q):
 
 
 @compiled
-def _may_be_reached(rule, position, quat):
+def _may_be_reached(rule: PostureRule, position: Vector, quat: Vector) -> bool:
     """Tell whether the pose puts the last joint's axis within the length of the links before it."""
     twice, across = stack_vector(3), stack_vector(3)
     cross_into(quat[1:], rule.last_axis, twice)
@@ -175,7 +176,7 @@ def _may_be_reached(rule, position, quat):
 
 
 @compiled
-def _turn_towards(rule, position, q):
+def _turn_towards(rule: PostureRule, position: Vector, q: Vector) -> None:
     """Turn the first joint by the pose's azimuth less home's, as far as its range goes."""
     axis, away = rule.chain.axes[0], stack_vector(3)
     for a in range(3):
@@ -194,7 +195,7 @@ def _turn_towards(rule, position, q):
 
 
 @compiled
-def _follow(rule, position, quat, q):
+def _follow(rule: PostureRule, position: Vector, quat: Vector, q: Vector) -> tuple[float, float, bool]:
     """Follow the minimum from q to a pose.
 
     Returns:
@@ -207,26 +208,26 @@ def _follow(rule, position, quat, q):
     for iteration in range(_ITERATIONS + 1):
         chain_kinematics(rule.chain, q, found, rotation, J)
         position_error, rotation_error = _pose_error(position, quat, found, rotation, error)
-        way = max(position_error / _WAY_M, rotation_error / _WAY_RAD)
-        stalled = stalled + 1 if way > best - 0.2 * min(best, 1.0) and way > 1e-3 else 0
-        if iteration == _ITERATIONS or stalled > _PATIENCE or not way < math.inf:
+        strides = max(position_error / _STRIDE_M, rotation_error / _STRIDE_RAD)
+        stalled = stalled + 1 if strides > best - 0.2 * min(best, 1.0) and strides > 1e-3 else 0
+        if iteration == _ITERATIONS or stalled > _PATIENCE or not strides < math.inf:
             break
-        best = min(best, way)
+        best = min(best, strides)
         for a in range(6):
-            error[a] /= max(way, 1.0)
+            error[a] /= max(strides, 1.0)
         _cost(rule, q, slope, scale)
-        _newton_step(J, error, slope, scale, step)
+        newton_step(J, error, slope, scale, step)
         largest, whole = _within_room(rule, q, step)
         for i in range(n):
             q[i] += step[i]
-        if way < 1.0 and whole and largest < _CONVERGED:
+        if strides < 1.0 and whole and largest < _CONVERGED:
             return position_error, rotation_error, True
     return position_error, rotation_error, position_error <= POSITION_TOLERANCE and rotation_error <= ROTATION_TOLERANCE
 
 
 @compiled
-def _pose_error(position, quat, found, rotation, error):
-    """Fill target less found, position and rotation vector, world axes, (6,); give their lengths in m and rad."""
+def _pose_error(position: Vector, quat: Vector, found: Vector, rotation: Matrix, error: Vector) -> tuple[float, float]:
+    """Fill target less found, position and rotation vector, world axes, (6,); return their lengths in m and rad."""
     q = matrix_to_quat_into(rotation, stack_vector(4))
     w = quat[0] * q[0] + quat[1] * q[1] + quat[2] * q[2] + quat[3] * q[3]
     error[3] = -quat[0] * q[1] + quat[1] * q[0] - quat[2] * q[3] + quat[3] * q[2]
@@ -242,7 +243,7 @@ def _pose_error(position, quat, found, rotation, error):
 
 
 @compiled
-def _cost(rule, q, slope, scale):
+def _cost(rule: PostureRule, q: Vector, slope: Vector, scale: Vector) -> None:
     """Fill W' of `find_posture` and 1/√W'', joint by joint, (n,)."""
     for i in range(q.shape[0]):
         span = rule.high[i] - rule.low[i]
@@ -258,155 +259,21 @@ def _cost(rule, q, slope, scale):
 
 
 @compiled
-def _newton_step(J, error, slope, scale, step):
-    """Fill the step of Newton's method on W − μ · pose, (n,).
-
-    In joints scaled so that W'' = 1, rows of Y from Gram and Schmidt: the first span what moves the tool, the others
-    are the null space Z. Along the first the step takes the error off; along the others it goes down W − μ · pose,
-    whose second derivative is 1 − C, C being the curvature of the pose times μ.
-    """
-    n = slope.shape[0]
-    Y, L, C, made_by = stack_matrix(n, n), stack_matrix(6, n), stack_matrix(n, n), stack_vector(n)
-    pull, mu, along = stack_vector(n), stack_vector(6), stack_vector(n)
-    rank = _task_rows(J, scale, Y, L, made_by)
-    _complete(Y, rank)
-    for k in range(n):
-        pull[k] = 0.0
-        for i in range(n):
-            pull[k] -= Y[k, i] * slope[i] * scale[i]
-    step[:] = 0.0
-    for k in range(rank):  # L along = error
-        a = int(made_by[k])
-        along[k] = error[a]
-        for j in range(k):
-            along[k] -= L[a, j] * along[j]
-        along[k] /= L[a, k]
-        for i in range(n):
-            step[i] += along[k] * Y[k, i]
-    if rank < n:
-        _multipliers(L, made_by, pull, rank, mu)
-        _curvature(J, mu, scale, C)
-        _descend(Y, C, pull, rank, step)
-    for i in range(n):
-        step[i] *= scale[i]
-
-
-@compiled
-def _task_rows(J, scale, Y, L, made_by):
-    """Fill orthonormal rows Y (n, n) and L (6, n) with J diag(scale) = L Y, and which row of J made each of Y.
-
-    Returns:
-        How many; a row of J that adds next to nothing to those before it makes none.
-    """
-    n, rank = scale.shape[0], 0
-    for a in range(6):
-        if rank == n:
-            break
-        row = Y[rank]
-        for i in range(n):
-            row[i] = J[a, i] * scale[i]
-        for k in range(rank):
-            L[a, k] = dot(row, Y[k])
-            for i in range(n):
-                row[i] -= L[a, k] * Y[k, i]
-        length = math.sqrt(dot(row, row))
-        if length > _LOST:
-            for i in range(n):
-                row[i] /= length
-            L[a, rank], made_by[rank] = length, a
-            rank += 1
-    return rank
-
-
-@compiled
-def _complete(Y, rank):
-    """Fill the rows of Y, (n, n), from rank on so that all are orthonormal."""
-    n = Y.shape[0]
-    for row in range(rank, n):
-        best, pivot = -1.0, 0
-        for i in range(n):
-            left = 1.0
-            for k in range(row):
-                left -= Y[k, i] * Y[k, i]
-            if left > best:
-                best, pivot = left, i
-        for i in range(n):
-            Y[row, i] = 1.0 if i == pivot else 0.0
-        for k in range(row):
-            part = Y[k, pivot]
-            for i in range(n):
-                Y[row, i] -= part * Y[k, i]
-        length = math.sqrt(dot(Y[row], Y[row]))
-        for i in range(n):
-            Y[row, i] /= length
-
-
-@compiled
-def _multipliers(L, made_by, pull, rank, mu):
-    """Fill what each task direction costs, μ with Lᵀ μ = −pull, (6,); 0 for those that made no row."""
-    mu[:] = 0.0
-    for k in range(rank - 1, -1, -1):
-        cost = -pull[k]
-        for j in range(k + 1, rank):
-            cost -= L[int(made_by[j]), k] * mu[int(made_by[j])]
-        mu[int(made_by[k])] = cost / L[int(made_by[k]), k]
-
-
-@compiled
-def _curvature(J, mu, scale, C):
-    """Fill Σ μ_a ∂²x_a/∂q_i∂q_j in scaled joints, (n, n).
-
-    Joint i carries the axis of every later one: ∂J_j/∂q_i = z_i × J_j for i ≤ j. A rotation vector's own second
-    derivative is the symmetric half of that.
-    """
-    for i in range(scale.shape[0]):
-        x, y, z = J[3, i], J[4, i], J[5, i]
-        ux, uy, uz = mu[1] * z - mu[2] * y, mu[2] * x - mu[0] * z, mu[0] * y - mu[1] * x
-        vx, vy, vz = mu[4] * z - mu[5] * y, mu[5] * x - mu[3] * z, mu[3] * y - mu[4] * x
-        for j in range(i, scale.shape[0]):
-            linear = ux * J[0, j] + uy * J[1, j] + uz * J[2, j]
-            angular = vx * J[3, j] + vy * J[4, j] + vz * J[5, j]
-            C[i, j] = (linear + 0.5 * angular) * scale[i] * scale[j]
-            C[j, i] = C[i, j]
-
-
-@compiled
-def _descend(Y, C, pull, rank, step):
-    """Add Newton's step in the null space, rows of Y from rank on; where the cost is no bowl, steepest descent's."""
-    n, m = Y.shape[0], Y.shape[0] - rank
-    B, B_inv, wanted, bent = stack_matrix(m, m), stack_matrix(m, m), stack_vector(m), stack_vector(n)
-    for k in range(m):
-        for i in range(n):
-            bent[i] = dot(C[i], Y[rank + k])
-        wanted[k] = pull[rank + k] + dot(bent, step)
-        for j in range(m):
-            B[k, j] = (1.0 if j == k else 0.0) - dot(bent, Y[rank + j])
-    if not spd_inverse(B, B_inv):
-        B_inv[:] = 0.0
-        for k in range(m):
-            B_inv[k, k], wanted[k] = 1.0, pull[rank + k]
-    for k in range(m):
-        part = dot(B_inv[k], wanted)
-        for i in range(n):
-            step[i] += part * Y[rank + k, i]
-
-
-@compiled
-def _within_room(rule, q, step):
+def _within_room(rule: PostureRule, q: Vector, step: Vector) -> tuple[float, bool]:
     """Shorten a step in place so that every joint stays within its range.
 
     Returns:
         The largest part of it as it was, rad, and whether it is whole.
     """
-    largest, share = 0.0, 1.0
+    largest, fraction = 0.0, 1.0
     for i in range(q.shape[0]):
         size = abs(step[i])
         room = rule.high[i] - q[i] if step[i] > 0.0 else q[i] - rule.low[i]
-        if size * share > _ROOM * room:
-            share = _ROOM * room / size
-        if size * share > _STEP:
-            share = _STEP / size
+        if size * fraction > _ROOM * room:
+            fraction = _ROOM * room / size
+        if size * fraction > _STEP:
+            fraction = _STEP / size
         largest = max(largest, size)
     for i in range(q.shape[0]):
-        step[i] *= share
-    return largest, share == 1.0
+        step[i] *= fraction
+    return largest, fraction == 1.0

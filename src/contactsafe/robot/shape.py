@@ -1,14 +1,15 @@
 """Where an arm's capsules and tip are: kinematics from the description alone, many postures at once, no MuJoCo."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.description import ArmDescription, Tool
 
 
-def link_frames(description: ArmDescription, q) -> tuple[np.ndarray, np.ndarray]:
-    """Give the frames of base, links and tool mount in world axes, base at the origin.
+def link_frames(description: ArmDescription, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Return the frames of base, links and tool mount in world axes, base at the origin.
 
     Args:
         description: the arm, of n joints.
@@ -28,14 +29,15 @@ def link_frames(description: ArmDescription, q) -> tuple[np.ndarray, np.ndarray]
     rotations = np.zeros((len(q), n + 2, 3, 3))
     rotations[:, 0] = np.eye(3)
     for i, link in enumerate(description.links, start=1):
-        turn = _about_z(q[:, i - 1])
         _attach(origins, rotations, i, link.position, link.quat)
-        rotations[:, i] = rotations[:, i] @ turn
+        rotations[:, i] = rotations[:, i] @ _about_z(q[:, i - 1])
     _attach(origins, rotations, n + 1, description.mount_position, description.mount_quat)
     return origins, rotations
 
 
-def arm_capsules(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def arm_capsules(
+    description: ArmDescription, tool: Tool, q: ArrayLike
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Place all capsules of an arm and its tool in the world.
 
     Args:

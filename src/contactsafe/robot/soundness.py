@@ -1,6 +1,9 @@
 """Numbers that no arm can have, refused when one is made: in a tick they would become its torque."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.surface import SURFACE_COLUMNS
@@ -21,8 +24,8 @@ _PER_JOINT = {"q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction":
 """What an arm has of every joint, and the shape of it."""
 
 
-def as_numbers(arm) -> dict[str, np.ndarray | float]:
-    """Give an arm's fields that are numbers, as such: arrays of one row a joint, and floats.
+def as_numbers(arm: Any) -> dict[str, np.ndarray | float]:
+    """Return an arm's fields that are numbers, as such: arrays of one row a joint, and floats.
 
     Args:
         arm: `Arm`, as it was given.
@@ -37,7 +40,7 @@ def as_numbers(arm) -> dict[str, np.ndarray | float]:
     return {**fields, **single, "surface": array_of(arm.surface, (points, SURFACE_COLUMNS), "surface")}
 
 
-def array_of(value, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
+def array_of(value: ArrayLike, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
     """Copy numbers into an array of a shape.
 
     Args:
@@ -62,7 +65,7 @@ def array_of(value, shape: tuple[int, ...], name: str, kind: str = "") -> np.nda
     return array
 
 
-def refuse_unsound(arm) -> None:
+def refuse_unsound(arm: Any) -> None:
     """Check what an arm is made of.
 
     Args:
@@ -120,7 +123,7 @@ def _refuse_unsound_limits(arm) -> None:
 
 
 def _refuse_unsound_friction(arm) -> None:
-    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is what it takes both ways together."""
+    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is the sum of both directions."""
     for i, (phi1, phi2, phi3) in enumerate(arm.friction):
         most = 2.0 * arm.tau_max[i]
         if not 0.0 <= phi1 <= most:

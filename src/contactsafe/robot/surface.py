@@ -1,4 +1,4 @@
-"""The surface of an arm: points of its surface where something may touch it, and the way that thing can push there."""
+"""The surface of an arm: points where something may touch it, and the direction in which it can push there."""
 
 import copy
 import math
@@ -16,8 +16,8 @@ _ALONG, _AROUND = 5, 12
 _POINTS = 480
 """Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
 
-_STARTS, _WAYS = 1000, 5
-"""Of the lines that look for a link's surface; few ways from a start, or the points would huddle before it."""
+_STARTS, _DIRECTIONS = 1000, 5
+"""Of the lines that look for a link's surface; few directions from a start, or the points would huddle before it."""
 
 _TURN_M = 0.02
 """Points whose normals differ by 1 count as so far apart: a thin plate has two sides."""
@@ -44,10 +44,10 @@ def _capsule_points(link: int, capsule: Capsule) -> np.ndarray:
     side /= np.linalg.norm(side)
     other = np.cross(axis, side)
     rows = []
-    for share in np.linspace(0.0, 1.0, _ALONG):
+    for fraction in np.linspace(0.0, 1.0, _ALONG):
         for turn in np.arange(_AROUND) * 2 * math.pi / _AROUND:
             normal = math.cos(turn) * side + math.sin(turn) * other
-            rows.append([link, *(start + share * (end - start) + capsule.radius * normal), *normal])
+            rows.append([link, *(start + fraction * (end - start) + capsule.radius * normal), *normal])
     return np.array(rows)
 
 
@@ -65,14 +65,12 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
     """
     seen = copy.copy(model)
     seen.geom_matid[:], seen.geom_rgba[:, 3] = -1, 1.0  # rays pass through what is transparent
-    found = {}
+    found, rows = {}, [np.zeros((0, SURFACE_COLUMNS))]
     for link in range(2, len(origins) + 1):
         geoms = np.flatnonzero(link_of[model.geom_bodyid] == link)
         solid = geoms[(model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)]
-        points = _surface(seen, data, solid if solid.size else geoms)
-        if len(points):
+        if len(points := _surface(seen, data, solid if solid.size else geoms)):
             found[link] = points
-    rows = [np.zeros((0, SURFACE_COLUMNS))]
     for link, points in found.items():
         points = _spread(points, _POINTS // len(found))
         points[:, :3] -= origins[link - 1]
@@ -94,19 +92,21 @@ def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> n
     centre = data.geom_xpos[geoms].mean(axis=0)
     radius = 1.01 * np.max(np.linalg.norm(data.geom_xpos[geoms] - centre, axis=1) + model.geom_rbound[geoms])
     rng = np.random.default_rng(0)
-    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _WAYS))
-    ways = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
-    distances, normals = np.zeros((_STARTS, _WAYS)), np.zeros((_STARTS, 3 * _WAYS))
-    geom = np.zeros(_WAYS, dtype=np.int32)
-    for start, way, distance, normal in zip(starts, ways, distances, normals, strict=True):
-        mujoco.mj_multiRay(model, data, start[0], way.ravel(), group, True, -1, geom, distance, normal, _WAYS, np.inf)
-    normals = normals.reshape(ways.shape)
-    normals *= -np.sign(np.sum(normals * ways, axis=2, keepdims=True))  # faces of a mesh may be wound either way
-    return np.concatenate([starts + distances[..., None] * ways, normals], axis=2)[distances >= 0.0]
+    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _DIRECTIONS))
+    directions = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
+    distances, normals = np.zeros((_STARTS, _DIRECTIONS)), np.zeros((_STARTS, 3 * _DIRECTIONS))
+    geom = np.zeros(_DIRECTIONS, dtype=np.int32)
+    for start, direction, distance, normal in zip(starts, directions, distances, normals, strict=True):
+        mujoco.mj_multiRay(
+            model, data, start[0], direction.ravel(), group, True, -1, geom, distance, normal, _DIRECTIONS, np.inf
+        )
+    normals = normals.reshape(directions.shape)
+    normals *= -np.sign(np.sum(normals * directions, axis=2, keepdims=True))  # whichever side a face has
+    return np.concatenate([starts + distances[..., None] * directions, normals], axis=2)[distances >= 0.0]
 
 
 def _on_sphere(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
-    """Draw points of the unit sphere, (*shape, 3)."""
+    """Sample points of the unit sphere, (*shape, 3)."""
     points = rng.normal(size=(*shape, 3))
     return points / np.linalg.norm(points, axis=2, keepdims=True)
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
@@ -21,8 +22,7 @@ from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, lis
 from contactsafe.robot.description import Inertia
 from contactsafe.robot.surface import geom_surface
 
-_BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
-_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+_BODY, _KEY, _HINGE = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY, mujoco.mjtJoint.mjJNT_HINGE
 _NOTHING = 1e-12
 """Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
 
@@ -38,12 +38,12 @@ def from_mjcf(
     site: str,
     joints: Sequence[str] | None = None,
     *,
-    tau_max=None,
+    tau_max: ArrayLike | None = None,
     torque_rate_max: float | None = None,
-    friction=None,
-    home=None,
+    friction: ArrayLike | None = None,
+    home: ArrayLike | None = None,
 ) -> Arm:
-    """Give the arm inside a user's own MJCF scene.
+    """Return the arm inside a user's own MJCF scene.
 
     The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
     of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
@@ -55,21 +55,18 @@ def from_mjcf(
     Args:
         scene: path of the MJCF file, or the model compiled from it.
         site: end-effector point; its axes are the tool's.
-        joints: names of the arm's hinge joints from base to tip; None for all joints that move the site, if each is a
-            hinge with an actuator.
+        joints: names of the arm's hinges from base to tip; None for all that move the site, if each has an actuator.
         tau_max: torque limits, (n,), N m; None for the model's own: forcerange and, of motors, ctrlrange, times gear,
             and actuatorfrcrange of joints. Where both are given, the smaller holds.
-        torque_rate_max: N m/s, every joint; None for what takes the strongest motor to its limit in 87 ms, as on a
-            Panda, and no less than the Panda's 1000 N m/s.
+        torque_rate_max: N m/s; None for the strongest motor's limit in 87 ms, as on a Panda, and at least 1000.
         friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3); None for none.
         home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
 
     Returns:
-        An arm without description and tool; a joint without limits has the range ±inf, and speed limits, which MJCF
-        does not know, are inf.
+        An arm without description and tool. Limits that the model does not give are inf, as those of speed.
 
     Raises:
-        InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or not on the way to the
+        InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or does not move the
             site, the choice of joints or actuators is ambiguous, torque limits are missing, a body of the arm
             carries its own weight (gravcomp), an equality constraint ties the arm, or gravity or a range is no number.
     """
@@ -79,14 +76,9 @@ def from_mjcf(
     n = len(chain)
     _refuse_weightless(model, chain)
     _refuse_tied(model, chain)
-    limited = model.jnt_limited[chain].astype(bool)
-    q_min, q_max = np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
+    q_min, q_max = _joint_range(model, chain)
     limits = _torque_limits(model, chain, tau_max)
     data, key_home = _at_start(model, chain)
-    if torque_rate_max is None:
-        torque_rate_max = _USUAL_RATE * max(1.0, float(limits.max()) / _USUAL_TORQUE)
-    elif not finite_array(torque_rate_max, (), "torque_rate_max") > 0.0:
-        raise InvalidInputError(f"torque_rate_max = {torque_rate_max} must be greater than 0; give N m/s")
     return Arm(
         name=model.names.split(b"\0")[0].decode(),
         model=_nominal_model(model, data, chain, site_id, limits),
@@ -95,12 +87,26 @@ def from_mjcf(
         q_max=q_max,
         qd_max=np.full(n, np.inf),
         tau_max=limits,
-        torque_rate_max=float(torque_rate_max),
+        torque_rate_max=_torque_rate(torque_rate_max, limits),
         friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
         home=_home(key_home if home is None else home, q_min, q_max),
         surface=geom_surface(model, data, _shown_by(model, chain), data.xanchor[chain]),
         lever_doubted=_LEVER_DOUBTED,
     )
+
+
+def _joint_range(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
+    limited = model.jnt_limited[chain].astype(bool)
+    return np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
+
+
+def _torque_rate(given: float | None, tau_max: np.ndarray) -> float:
+    """Return how fast motors change their torque, N m/s: as given, or in proportion to the strongest one."""
+    if given is None:
+        return _USUAL_RATE * max(1.0, float(tau_max.max()) / _USUAL_TORQUE)
+    if not finite_array(given, (), "torque_rate_max") > 0.0:
+        raise InvalidInputError(f"torque_rate_max = {given} must be greater than 0; give N m/s")
+    return float(given)
 
 
 def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
@@ -115,7 +121,7 @@ def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
 
 
 def _tied_bodies(model: mujoco.MjModel, i: int) -> list[int]:
-    """Give the moving bodies that an equality constraint ties: by their joints, by themselves or by their sites."""
+    """Return the moving bodies that an equality constraint ties: by their joints, by themselves or by their sites."""
     ends = [int(end) for end in (model.eq_obj1id[i], model.eq_obj2id[i]) if end >= 0]
     if model.eq_type[i] == int(mujoco.mjtEq.mjEQ_JOINT):
         return [int(model.jnt_bodyid[end]) for end in ends]
@@ -143,14 +149,14 @@ def _loaded(scene) -> mujoco.MjModel:
 def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> list[int]:
     """Choose the arm's joints among those that move the site, from base to tip."""
     moving = _joints_above(model, model.site_bodyid[site_id])
-    site, way = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
+    site, rest = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
     chosen = moving if names is None else [find(model, JOINT, name) for name in names]
     if not moving or not chosen:
-        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {way}")
+        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {rest}")
     for joint in chosen:
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if joint not in moving:
-            problem = f"does not move site {site}; joints that do, base to tip: {way}"
+            problem = f"does not move site {site}; joints that do, base to tip: {rest}"
         elif kind != _HINGE:
             word = kind.name.removeprefix("mjJNT_").lower()
             problem = f"is of type {word}; the arm's are hinges: give joints=[...] without it, to lock it"
@@ -160,7 +166,9 @@ def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> 
             continue
         raise InvalidInputError(f"joint {label(model, JOINT, joint)} {problem}")
     if chosen != [joint for joint in moving if joint in chosen]:
-        raise InvalidInputError(f"joints = {list(names or ())} are not in order; from base to tip they stand so: {way}")
+        raise InvalidInputError(
+            f"joints = {list(names or ())} are not in order; from base to tip they stand so: {rest}"
+        )
     return chosen
 
 
@@ -219,7 +227,7 @@ def _torque_limits(model: mujoco.MjModel, chain: list[int], given) -> np.ndarray
 
 
 def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
-    """Give what the model lets the joint's actuator do in both directions, N m; inf where it does not say."""
+    """Return what the model lets the joint's actuator do in both directions, N m; inf where it does not say."""
     ranges = []
     if model.jnt_actfrclimited[joint]:
         ranges.append(model.jnt_actfrcrange[joint])
@@ -290,7 +298,7 @@ def _nominal_model(
 
 
 def _rotor(model: mujoco.MjModel, joint: int) -> float:
-    """Give the rotor inertia felt at a joint, kg m²: its own armature, and the actuator's through the gear."""
+    """Return the rotor inertia felt at a joint, kg m²: its own armature, and the actuator's through the gear."""
     armature = float(model.dof_armature[model.jnt_dofadr[joint]])
     actuator = actuator_of(model, joint)
     if actuator is not None:
@@ -299,7 +307,7 @@ def _rotor(model: mujoco.MjModel, joint: int) -> float:
 
 
 def _inertias(model: mujoco.MjModel, data: mujoco.MjData, part: np.ndarray, origin: np.ndarray) -> list[Inertia]:
-    """Give the inertia of bodies as they stand, in world axes and from an origin (3,), m; part: which, (nbody,)."""
+    """Return the inertia of bodies as they stand, in world axes and from an origin (3,), m; part: which, (nbody,)."""
     found = []
     for body in np.flatnonzero(part & (model.body_mass > 0.0)):
         axes = data.ximat[body].reshape(3, 3)

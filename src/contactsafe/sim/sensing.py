@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from contactsafe.control.laws import observer_gain
+from contactsafe.control.laws import filter_gain
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.linalg import cross_into, matvec_into
@@ -67,7 +67,7 @@ def fill_errors(errors, arm: Arm, config: WorldConfig, tick_s: float) -> None:
     errors["moment_sigma"], errors["accelerometer_sigma"] = sensors.moment_nm, sensors.accelerometer_m_s2
     errors["encoder_step"] = sensors.encoder_step_rad
     if math.isfinite(sensors.velocity_filter_hz):
-        errors["velocity_filter_gain"] = observer_gain(2 * math.pi * sensors.velocity_filter_hz, tick_s)
+        errors["velocity_filter_gain"] = filter_gain(2 * math.pi * sensors.velocity_filter_hz, tick_s)
     errors["tool_mass"], errors["tool_com"] = arm.tool.inertia.mass, arm.tool.inertia.com
     errors["tcp"] = arm.tool.tcp
     errors["friction"] = arm.friction
@@ -92,7 +92,7 @@ def sense(world, controller, noise):
             q = errors.encoder_step * math.floor(q / errors.encoder_step + 0.5)
         qd = truth.qd[i] + errors.qd_sigma * noise[n + i]
         if errors.velocity_filter_gain > 0.0:
-            rate = 0.0 if world.tick == 0 else (q - errors.q_seen[i]) / controller.params.dt
+            rate = 0.0 if world.tick == 0 else (q - errors.q_seen[i]) / controller.params.clock.dt
             qd = errors.qd_seen[i] + errors.velocity_filter_gain * (rate - errors.qd_seen[i])
         errors.q_seen[i], errors.qd_seen[i] = q, qd
         measurement.q[i], measurement.qd[i] = q, qd

@@ -91,17 +91,17 @@ def _measure(truth, metrics):
 @compiled
 def _record(world, controller, row):
     truth, out = world.truth, controller.output
-    row.time = world.tick * controller.params.dt
+    row.time = world.tick * controller.params.clock.dt
     row.q[:] = truth.q
     row.torque[:] = out.torque
     row.position[:] = truth.position
     row.error[:] = out.error
-    row.K_task[:] = controller.state.K_task
-    row.D_task[:] = controller.state.D_task
+    row.K_task[:] = controller.state.impedance.K_task
+    row.D_task[:] = controller.state.impedance.D_task
     row.wrench_ee[:] = controller.measurement.wrench_ee
     row.residual[:] = out.residual
     row.residual_fast[:] = out.residual_fast
-    row.mode, row.holding, row.link = out.mode, out.holding, out.link
+    row.mode, row.link = out.mode, out.link
     row.tool_force[:] = truth.tip_wrench[:3]
     row.obstacle_force = truth.obstacle_force.max()
     row.obstacle_position[:] = truth.obstacle_position

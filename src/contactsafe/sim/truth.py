@@ -73,8 +73,7 @@ def trace_dtype(n: int) -> np.dtype:
             ("tau_arm", _f, (n,)),  # true external torque less the tip's, N m
             ("residual", _f, (n,)),  # N m
             ("residual_fast", _f, (n,)),  # N m
-            ("mode", _i),
-            ("holding", _i),
+            ("mode", _i),  # of the controller: FREE, COMPLY or REJECT
             ("link", _i),
             ("progress", _f),  # of the task, 0 … 1; filled once a policy step
         ]

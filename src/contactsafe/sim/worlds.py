@@ -9,7 +9,8 @@ import numpy as np
 
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
-from contactsafe.control.records import controller_dtype, fill_params, index_bounds
+from contactsafe.control.params import fill_params
+from contactsafe.control.records import controller_dtype, index_bounds
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
@@ -82,8 +83,8 @@ def _models(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.M
 
 
 def _check_tick(controller: ControllerConfig | None) -> None:
-    if controller is not None and controller.dt != TICK_S:
-        raise InvalidInputError(f"controller dt = {controller.dt} s; simulated worlds tick every {TICK_S} s")
+    if controller is not None and controller.clock.dt != TICK_S:
+        raise InvalidInputError(f"controller dt = {controller.clock.dt} s; simulated worlds tick every {TICK_S} s")
 
 
 class Worlds(Independent):

@@ -45,7 +45,7 @@ def observe_arm(controller, task):
     """
     observed_pose(controller, task.pose)
     observed_target(controller, task.pose, task.target)
-    task.force[:] = controller.state.tool_force
+    task.force[:] = controller.state.tool_wrench.force
 
 
 @compiled

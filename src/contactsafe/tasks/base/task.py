@@ -33,7 +33,7 @@ class TaskOptions:
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
     """
 
-    controller: Annotated[str, one_of(presets.PRESETS)] = TaskConfig.controller
+    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name)] = TaskConfig.controller
     pushed: bool = False
 
     def settings(self) -> dict[str, Any]:

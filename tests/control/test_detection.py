@@ -1,6 +1,6 @@
 """When contact mode begins and ends, and what is said of the contact.
 
-An arm that stands still although g − τ is commanded is held by τ; with observers that follow at once the supervisor
+An arm that stands still although g − τ is commanded is held by τ; with observers that follow at once detection
 sees exactly that τ at every tick.
 """
 
@@ -15,14 +15,14 @@ from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
 
-INSTANT = {"observer_gain": 1e6, "detection_gain": 1e6, "residual_cutoff_hz": math.inf}
+INSTANT = {"compensation_gain": 1e6, "detection_gain": 1e6, "residual_cutoff_hz": math.inf}
 
 
 class Felt:
     """A controller whose arm stands still under whatever torque is felt, with nothing at its tool."""
 
     def __init__(self, arm, config, target=None):
-        self.controller = controller_at(arm, replace(config, **INSTANT))
+        self.controller = controller_at(arm, config.with_(**INSTANT))
         self.still = Measurement(arm.home, np.zeros(arm.n), UNTOUCHED)
         self.target = hold(arm) if target is None else target
         self.controller.step(self.still, self.target)
@@ -32,7 +32,7 @@ class Felt:
         modes = []
         for _ in range(ticks):
             record = self.controller.record
-            record["state"]["tau"] = record["dynamics"]["g"] - torque
+            record["state"]["command"]["tau"] = record["dynamics"]["g"] - torque
             self.out = self.controller.step(self.still, self.target)
             modes.append(self.out.contact.in_contact)
         return modes
@@ -58,22 +58,22 @@ def test_contact_lasts_for_the_dwell(panda):
 
 def test_contact_lasts_until_it_is_well_below_the_threshold(panda):
     """So that a contact kept gentle is not lost from sight."""
-    felt = Felt(panda, replace(presets.paper(), release_fraction=0.5))
+    felt = Felt(panda, presets.paper().with_(release_fraction=0.5))
     modes = felt.feel(joint(3, 2.0)) + felt.feel(joint(3, 0.76), 200) + felt.feel(joint(3, 0.74), 1)
     assert modes == [True] * 201 + [False]
 
 
 def test_a_command_on_the_rise_raises_the_threshold(panda):
     """By what comes late: at 1 N m a tick and a delay of 1.5 ticks, 1.5 N m."""
-    controller = controller_at(panda, replace(presets.paper(), delay_uncertainty_ticks=1.5, **INSTANT))
+    controller = controller_at(panda, presets.paper().with_(delay_uncertainty_ticks=1.5, **INSTANT))
     still = Measurement(panda.home, np.zeros(panda.n), UNTOUCHED)
     controller.step(still, hold(panda))
     state = controller.record["state"]
     for _k in range(3):
-        state["tau"] = state["tau_before"] + np.eye(7)[2]
+        state["command"]["tau"] = state["observer"]["tau_before"] + np.eye(7)[2]
         controller.step(still, hold(panda))
-    assert_allclose(state["threshold"], 1.5 + 1.5 * np.abs(state["torque_ramp"]), rtol=1e-12)
-    assert state["torque_ramp"][2] == pytest.approx(1.0)
+    assert_allclose(state["detection"]["threshold"], 1.5 + 1.5 * np.abs(state["observer"]["torque_ramp"]), rtol=1e-12)
+    assert state["observer"]["torque_ramp"][2] == pytest.approx(1.0)
 
 
 def test_contact_lasts_while_it_is_felt(panda):
@@ -84,7 +84,7 @@ def test_contact_lasts_while_it_is_felt(panda):
 
 def test_contact_is_released_only_after_quiet(panda):
     """With release_s = 0.2 a blip starts the 200 ticks anew."""
-    felt = Felt(panda, replace(presets.paper(), release_s=0.2))
+    felt = Felt(panda, presets.paper().with_(release_s=0.2))
     assert all(felt.feel(joint(3, 2.0)) + felt.feel(joint(3, 0.0), 150) + felt.feel(joint(3, 2.0)))
     assert felt.feel(joint(3, 0.0), 205) == [True] * 200 + [False] * 5
 
@@ -99,7 +99,7 @@ def test_contact_is_released_only_after_quiet(panda):
         ([1.4] * 7, 0),
     ],
 )
-def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(panda, torque, link):
+def test_link_of_an_arm_without_surface_samples_is_the_furthest_joint_above_the_threshold(panda, torque, link):
     felt = Felt(replace(panda, surface=panda.surface[:0]), presets.paper())
     felt.feel(np.array(torque, dtype=float))
     assert felt.out.contact.link == link
@@ -107,7 +107,7 @@ def test_link_of_an_arm_without_skin_is_the_furthest_joint_above_the_threshold(p
 
 
 @pytest.mark.parametrize("index", [215, 275, 335, 380, 430])
-def test_link_of_an_arm_with_skin_is_the_one_whose_skin_explains_the_torque(panda, index):
+def test_link_of_an_arm_with_surface_samples_is_the_one_whose_surface_explains_the_torque(panda, index):
     """The torque of 20 N on one point of the surface, not only the furthest joint that shows it."""
     row = panda.surface[index]
     bent = replace(panda, home=panda.home + np.array([0.2, 0.3, -0.4, 0.3, 0.5, 0.3, -0.2]))
@@ -138,43 +138,41 @@ def test_baseline_reports_the_link(panda):
 def test_direction_is_that_of_the_torque_last_felt(panda):
     felt = Felt(panda, presets.paper())
     felt.feel(np.array([0, 3.0, 0, -4.0, 0, 0, 0]))
-    assert felt.controller.record["state"]["direction"] == pytest.approx([0, 0.6, 0, -0.8, 0, 0, 0])
+    assert felt.controller.record["state"]["isolation"]["direction"] == pytest.approx([0, 0.6, 0, -0.8, 0, 0, 0])
     felt.feel(np.zeros(7))
-    assert felt.controller.record["state"]["direction"] == pytest.approx([0, 0.6, 0, -0.8, 0, 0, 0])
+    assert felt.controller.record["state"]["isolation"]["direction"] == pytest.approx([0, 0.6, 0, -0.8, 0, 0, 0])
 
 
 def pressing(panda, offset=0.05):
     """A target beyond an obstacle, its bound 2 N m; and the torque of an obstacle that stands before it."""
-    config = replace(
-        presets.paper(), recover_s=0.2, contact_torque_limit_comply_nm=2.0, contact_force_limit_initial_n=0.0
-    )
+    config = presets.paper().with_(recover_s=0.2, contact_torque_limit_comply_nm=2.0, contact_force_limit_initial_n=0.0)
     obstacle = panda.dynamics(panda.home, np.zeros(7))["J"][1] * -20.0
     return Felt(panda, config, reach(panda, [0.0, offset, 0.0])), obstacle
 
 
-def test_tasks_pull_gives_way_at_once_and_comes_back_slowly(panda):
-    """Scaled as a whole until contact ends, then 1 − (1 − share) exp(−t/recover_s) of it."""
+def test_task_yields_at_once_and_comes_back_slowly(panda):
+    """Scaled as a whole until contact ends, then 1 − (1 − scale) exp(−t/recover_s) of it."""
     felt, obstacle = pressing(panda)
     state = felt.controller.record["state"]
-    assert state["task_scale"] == 1.0
+    assert state["reaction"]["task_scale"] == 1.0
     felt.feel(obstacle)
-    share = float(state["task_scale"])
-    assert share < 0.9
+    scale = float(state["reaction"]["task_scale"])
+    assert scale < 0.9
     modes = felt.feel(obstacle, 100) + felt.feel(np.zeros(7), 250)
     assert modes == [True] * 100 + [False] * 250
-    assert_allclose(state["task_scale"], 1 - (1 - share) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
+    assert_allclose(state["reaction"]["task_scale"], 1 - (1 - scale) * math.exp(-250 * 0.001 / 0.2), rtol=1e-9)
 
 
-def test_task_pulls_whole_again_at_once_where_nothing_delays_it(panda):
+def test_task_is_whole_again_at_once_where_nothing_delays_it(panda):
     felt, obstacle = pressing(panda)
-    felt.controller.record["params"]["recover_gain"] = 1.0
+    felt.controller.record["params"]["one_tick"]["recover_gain"] = 1.0
     felt.feel(obstacle, 100)
     felt.feel(np.zeros(7))
-    assert felt.controller.record["state"]["task_scale"] == 1.0
+    assert felt.controller.record["state"]["reaction"]["task_scale"] == 1.0
 
 
 def test_paper_takes_nothing_off_the_task(panda):
     felt = Felt(panda, presets.paper(), reach(panda, [0.0, 0.05, 0.0]))
     felt.feel(pressing(panda)[1], 10)
     assert felt.out.contact.in_contact
-    assert felt.controller.record["state"]["task_scale"] == 1.0
+    assert felt.controller.record["state"]["reaction"]["task_scale"] == 1.0

@@ -1,20 +1,19 @@
-"""Yield to what is in the way, hold against what pushes; and never push a contact harder than the bound in force."""
-
-from dataclasses import replace
+"""Comply with obstacles, reject pushes, and never press with more than the bound in force."""
 
 import numpy as np
 import pytest
 from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach, wrist_meets_sphere
-from tests.control.targets import harass
+from tests.control.targets import disturb
 
 from contactsafe import presets
-from contactsafe.control.laws import push_along
+from contactsafe.control.codes import REJECT
+from contactsafe.control.laws import torque_against_contact
 
-SAFE = replace(presets.safe(), friction_compensation=False)
+SAFE = presets.safe().with_(friction_compensation=False)
 
 
 def collision(panda, stiffness, seconds=2.0):
-    """Send the tool sideways by 25 cm, 5 cm ahead at most, the wrist against a sphere; yield what happens each tick."""
+    """Send the tool sideways by 25 cm, at most 5 cm off, the wrist against a sphere; yield what happens each tick."""
     plant = wrist_meets_sphere(panda, 0.04, stiffness)
     controller = controller_at(panda, SAFE)
     start = plant.tool_position()[1]
@@ -28,8 +27,8 @@ def collision(panda, stiffness, seconds=2.0):
 def commanded_push(controller, out):
     """Give what the command pushes along the contact with, N m: torque less c, g and friction."""
     now, state = controller.record["dynamics"], controller.record["state"]
-    net = out.torque - now["c"] - now["g"] - state["friction"]
-    return push_along(state["direction"].copy(), now["M_inv"].copy(), net)
+    net = out.torque - now["c"] - now["g"] - state["command"]["friction"]
+    return torque_against_contact(state["isolation"]["direction"].copy(), now["M_inv"].copy(), net)
 
 
 def spring_torque(plant):
@@ -48,15 +47,15 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
         contacts.append(out.contact)
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
-    assert not any(contact.holding for contact in contacts)
-    assert 0.9 * SAFE.contact_force_limit_comply_n < np.mean(forces[-300:]) < 1.1 * SAFE.contact_force_limit_comply_n
+    assert not any(contact.kind == "push" for contact in contacts)
+    assert np.mean(forces[-300:]) == pytest.approx(SAFE.reaction.contact_force_limit_comply_n, rel=0.1)
 
 
 @pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), (20000.0, 0.12)])
 def test_steady_torque_of_an_obstacle_is_the_bound_in_force(panda, stiffness, off):
     """But for the angle between the contact's torque and the direction that was found for it."""
     *_, (_, controller, plant) = collision(panda, stiffness, seconds=4.0)
-    assert spring_torque(plant) == pytest.approx(float(controller.record["output"]["push_limit_nm"]), rel=off)
+    assert spring_torque(plant) == pytest.approx(float(controller.record["output"]["contact_limit_nm"]), rel=off)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
@@ -69,34 +68,36 @@ def test_command_never_pushes_an_obstacle_harder_than_the_bound(panda, stiffness
     for out, controller, _ in collision(panda, stiffness):
         if out.contact.in_contact and "rate" not in out.limited_by:
             pushes.append(commanded_push(controller, out))
-            limits.append(float(controller.record["output"]["push_limit_nm"]))
+            limits.append(float(controller.record["output"]["contact_limit_nm"]))
     assert len(pushes) > 300
     assert (np.array(pushes) <= np.array(limits) + 1e-9).all()
     assert max(pushes) > 0.99 * min(limits)
-    assert max(limits) <= SAFE.contact_force_limit_initial_n * 0.7  # the lever arm is about half a metre
-    assert 0.2 * SAFE.contact_force_limit_comply_n < min(limits) < SAFE.contact_torque_limit_comply_nm
+    assert max(limits) <= SAFE.reaction.contact_force_limit_initial_n * 0.7  # the lever arm is about half a metre
+    assert 0.2 * SAFE.reaction.contact_force_limit_comply_n < min(limits) < SAFE.reaction.contact_torque_limit_comply_nm
 
 
 def stopped(controller, q, qd):
     """Tell whether a joint stop is in force: a joint within the margin of its range, or too fast to stay out of it."""
     params = controller.record["params"]
-    left = np.where(qd > 0, params["q_max"] - q, q - params["q_min"]) - params["joint_margin"]
-    near = np.minimum(params["q_max"] - q, q - params["q_min"]) < params["joint_margin"]
-    allowed = np.minimum(params["qd_max"], np.sqrt(2 * params["joint_deceleration"] * np.maximum(left, 0.0)))
+    left = np.where(qd > 0, params["arm"]["q_max"] - q, q - params["arm"]["q_min"]) - params["limits"]["joint_margin"]
+    near = np.minimum(params["arm"]["q_max"] - q, q - params["arm"]["q_min"]) < params["limits"]["joint_margin"]
+    allowed = np.minimum(
+        params["arm"]["qd_max"], np.sqrt(2 * params["limits"]["joint_deceleration"] * np.maximum(left, 0.0))
+    )
     return near.any() or (np.abs(qd) > allowed).any()
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_bound_holds_whatever_is_asked_and_whatever_pushes(quick_panda, seed):
-    """Hostile targets, pushes anywhere, motors without limits; where no joint stop is in force."""
+    """Fuzzed targets, pushes anywhere, motors without limits; where no joint stop is in force."""
     rng, plant = np.random.default_rng(seed), Plant(quick_panda)
     controller, target, over = controller_at(quick_panda, presets.safe()), None, []
     for k in range(3000):
-        target = harass(k, 170, quick_panda, plant, rng, target)
+        target = disturb(k, 170, quick_panda, plant, rng, target)
         q, qd = plant.q, plant.qd
         out = plant.run(controller, target, 1, UNTOUCHED)
         if out.contact.in_contact and not stopped(controller, q, qd):
-            over.append(commanded_push(controller, out) - float(controller.record["output"]["push_limit_nm"]))
+            over.append(commanded_push(controller, out) - float(controller.record["output"]["contact_limit_nm"]))
     assert len(over) > 500
     assert max(over) < 1e-9
 
@@ -113,29 +114,35 @@ def test_lasting_push_is_held_against(panda, body, force):
         out = plant.run(controller, still, 1, UNTOUCHED)
         away.append(np.linalg.norm(plant.tool_position() - before))
     assert out.contact.in_contact
-    assert out.contact.holding
+    assert out.contact.kind == "push"
     assert max(away) < 0.010
     assert away[-1] < 0.004
 
 
-def test_bound_while_holding_is_a_multiple_of_the_pushers_torque_and_falls_ever_more_slowly(panda):
-    """`reject_margin` times it; tried again after `hold_s`, then twice, four times as long."""
+def test_bound_in_mode_reject_is_a_multiple_of_the_torque_of_a_push_and_falls_ever_more_slowly(panda):
+    """`reject_margin` times it; tried again after `reject_decay_s`, then twice, four times as long."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.push("link5", (0.0, 25.0, 0.0))
     still = hold(panda)
     state, times, held = controller.record["state"], [], []
     for k in range(4000):
         plant.run(controller, still, 1, UNTOUCHED)
-        if state["holding"] and (not times or state["hold_s"] > times[-1][1]):
-            times.append((k, float(state["hold_s"])))
-            held.append(float(state["hold_nm"]) / float(state["torque_smooth_nm"]))
-    assert [hold_s for _, hold_s in times[:3]] == [SAFE.hold_s, 2 * SAFE.hold_s, 4 * SAFE.hold_s]
-    assert held == pytest.approx([SAFE.reject_margin] * len(held), rel=0.01)
+        if state["mode"] == REJECT and (not times or state["reaction"]["reject_decay_s"] > times[-1][1]):
+            times.append((k, float(state["reaction"]["reject_decay_s"])))
+            held.append(
+                float(state["reaction"]["reject_limit_nm"]) / float(state["classification"]["torque_smooth_nm"])
+            )
+    assert [decay_s for _, decay_s in times[:3]] == [
+        SAFE.reaction.reject_decay_s,
+        2 * SAFE.reaction.reject_decay_s,
+        4 * SAFE.reaction.reject_decay_s,
+    ]
+    assert held == pytest.approx([SAFE.reaction.reject_margin] * len(held), rel=0.01)
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
-def test_there_is_no_second_blow_of_an_obstacle_that_stays(panda, stiffness):
-    """It stays in sight, and the arm leans on it gently: after the first second with less than half of the blow."""
+def test_there_is_no_second_impact_of_an_obstacle_that_stays(panda, stiffness):
+    """It stays detected, and the arm leans on it gently: after a second with less than half of the first impact."""
     torques, commands, contacts = [], [], []
     for out, _, plant in collision(panda, stiffness, seconds=7.0):
         torques.append(spring_torque(plant))
@@ -172,7 +179,7 @@ PUSHES = [("link5", (0.0, 40.0, 0.0)), ("link4", (0.0, -40.0, 0.0))]
 
 
 @pytest.mark.parametrize(("body", "force"), PUSHES)
-def test_tool_stays_where_it_is_when_the_pusher_lets_go(panda, body, force):
+def test_tool_stays_where_it_is_when_the_push_ends(panda, body, force):
     torque, *_, away = released(panda, body, force)
     assert away < 0.005
     assert np.abs(np.diff(torque, axis=0)).max() <= 1.0

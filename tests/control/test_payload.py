@@ -1,8 +1,7 @@
-"""What the tool carries is weighed at rest, taken over without a jump, and never sinks in silence."""
+"""What the tool carries is identified at rest, taken over without a jump, and never sinks in silence."""
 
 import copy
 import pickle
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -14,7 +13,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.payload import Payload, carrying
 
-BARE = {name: replace(presets.by_name(name), friction_compensation=False) for name in presets.PRESETS}
+BARE = {name: presets.by_name(name).with_(friction_compensation=False) for name in presets.PRESETS}
 SAFE = BARE["safe"]
 COM = np.array([0.03, -0.02, 0.05])
 INERTIA = np.diag([0.01, 0.012, 0.008])

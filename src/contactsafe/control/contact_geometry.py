@@ -10,6 +10,7 @@ import math
 
 from numpy import empty, zeros
 
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross_into, dot, matvec, spd_inverse
 from contactsafe.core.native import view2
@@ -20,8 +21,8 @@ _NO_LEVER = 1e-9  # m; a point with less explains no torque, and its square may 
 
 
 @compiled
-def contact_lever(handle, link, direction):
-    """Give the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
+def contact_lever(handle: Record, link: int, direction: Vector) -> float:
+    """Return the lever arm of a contact: joint torque per newton, at a point that stands for the link, m.
 
     With J_p the Jacobian of the link's centre of mass, the least force there that explains a joint torque τ is
     (J_p J_pᵀ)⁻¹ J_p τ; a little damping keeps it finite where the link cannot be moved along some axis. The handle
@@ -55,7 +56,7 @@ def contact_lever(handle, link, direction):
 
 
 @compiled
-def surface_torque(handle, index, out):
+def surface_torque(handle: Record, index: int, out: Vector) -> int:
     """Fill the joint torque that 1 N on a point of the surface, inwards along its normal, puts on the arm, (n,), N m.
 
     Args:
@@ -88,19 +89,18 @@ def surface_torque(handle, index, out):
 
 
 @compiled
-def best_point(handle, start, stop, torque, scratch, best, best_fit):
-    """Search part of the surface for the point that explains a joint torque best.
+def best_point(
+    handle: Record, start: int, stop: int, torque: Vector, scratch: Vector, best: int, best_fit: float
+) -> tuple[int, float]:
+    """Return the point that explains a joint torque best, of part of the surface and the best one so far; its fit.
 
     Args:
         handle: of the nominal model.
         start, stop: points searched.
         torque: of the contact on the arm, (n,), N m.
         scratch: (n,); overwritten.
-        best: the best point of those searched before, −1 for none.
-        best_fit: its fit, the cosine between its torque and the one found, less where its lever arm is short.
-
-    Returns:
-        The best point so far and its fit.
+        best, best_fit: point of those searched before, −1 for none, and its fit: the cosine between its torque and the
+            one found, less where its lever arm is short.
     """
     doubted = handle.lever_doubted * handle.lever_doubted
     for index in range(start, stop):

@@ -1,7 +1,6 @@
-"""The links are weighed while nothing touches the arm; what is learned comes off the residual and the threshold."""
+"""Link masses are identified while nothing touches the arm; that comes off the residual and the threshold."""
 
 import copy
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -15,11 +14,11 @@ from contactsafe import presets
 from contactsafe.control.laws import identify_masses
 from contactsafe.robot.dynamics import dynamics_dtype, mass_regressor, update_dynamics
 
-SAFE = replace(presets.safe(), friction_compensation=False)
-WAY = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
+SAFE = presets.safe().with_(friction_compensation=False)
+PATH = ([0.05, 0.1, 0.05], [-0.1, 0.1, 0.05], [-0.1, -0.15, 0.1], [0.05, -0.1, -0.1])
 
 ANY = np.full(8, np.inf)
-"""No bound on what a link may weigh."""
+"""No bound on the mass of a link."""
 
 
 def psd(A):
@@ -83,7 +82,7 @@ def heavier(arm, scale):
 def moved(arm, config, model=None):
     """Move about for 2 s; give the controller, its plant, the mean residual of the last 0.25 s and contact ticks."""
     plant, controller, seen, contacts = Plant(arm, model=model), controller_at(arm, config), [], 0
-    for offset in WAY:
+    for offset in PATH:
         target = reach(arm, offset)
         for _ in range(500):
             out = plant.run(controller, target, 1, UNTOUCHED)
@@ -95,29 +94,29 @@ def moved(arm, config, model=None):
 @pytest.mark.parametrize("scale", [1.1, 0.9])
 def test_links_that_weigh_ten_percent_more_or_less_do_not_show_after_two_seconds(panda, scale):
     """Bias of the residual 0.31 to 0.35 N m; 2.1 N m where the model is trusted."""
-    *_, weighed, contacts = moved(panda, SAFE, heavier(panda, scale))
-    trusting = replace(SAFE, mass_uncertainty=0.0, contact_aware=False)  # or what it takes for contact moves the arm
+    *_, correction, contacts = moved(panda, SAFE, heavier(panda, scale))
+    trusting = SAFE.with_(mass_uncertainty=0.0, contact_aware=False)  # or what it takes for contact moves the arm
     *_, trusted, _ = moved(panda, trusting, heavier(panda, scale))
-    assert np.abs(weighed).max() < 0.5
+    assert np.abs(correction).max() < 0.5
     assert np.abs(trusted).max() > 1.5
     assert contacts == 0
 
 
 def test_arm_as_modelled_is_found_to_weigh_what_its_model_says(panda):
     controller, *_ = moved(panda, SAFE)
-    assert np.abs(controller.record["state"]["mass_error"]).max() < 0.01
+    assert np.abs(controller.record["state"]["link_masses"]["mass_error"]).max() < 0.01
 
 
 def test_threshold_falls_as_the_weight_becomes_known(panda):
-    """From the share of the unknown weight down to δ and little more, at rest in the posture it was found in."""
+    """From the fraction of the unknown weight down to δ and little more, at rest in the posture it was found in."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 1, UNTOUCHED)
-    first = controller.record["state"]["threshold"].copy()
+    first = controller.record["state"]["detection"]["threshold"].copy()
     plant.run(controller, hold(panda), 2000, UNTOUCHED)
-    last = controller.record["state"]["threshold"]
-    assert first.max() > SAFE.residual_threshold + 1.5
+    last = controller.record["state"]["detection"]["threshold"]
+    assert first.max() > SAFE.detection.residual_threshold + 1.5
     assert (last <= first + 1e-12).all()
-    assert last.max() < SAFE.residual_threshold + 0.5
+    assert last.max() < SAFE.detection.residual_threshold + 0.5
 
 
 def test_nothing_is_learned_in_contact(panda):
@@ -126,22 +125,22 @@ def test_nothing_is_learned_in_contact(panda):
     plant.push("link5", (0.0, 25.0, 0.0))
     while not plant.run(controller, hold(panda), 1, UNTOUCHED).contact.in_contact:
         pass
-    before = controller.record["state"]["mass_error"].copy()
+    before = controller.record["state"]["link_masses"]["mass_error"].copy()
     out = plant.run(controller, hold(panda), 1000, UNTOUCHED)
     assert out.contact.in_contact
-    assert_array_equal(controller.record["state"]["mass_error"], before)
+    assert_array_equal(controller.record["state"]["link_masses"]["mass_error"], before)
 
 
 def test_nothing_is_learned_where_a_hand_could_hold_the_tool_unseen(panda):
     """Without a force sensor what hangs on the tool would be taken for weight of the links."""
     plant, controller = Plant(panda, model=heavier(panda, 1.1)), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 1000)
-    assert not controller.record["state"]["mass_error"].any()
+    assert not controller.record["state"]["link_masses"]["mass_error"].any()
 
 
 def test_model_that_is_trusted_is_not_weighed(panda):
     controller, *_ = moved(panda, presets.paper(), heavier(panda, 1.05))
-    assert not controller.record["state"]["mass_error"].any()
+    assert not controller.record["state"]["link_masses"]["mass_error"].any()
 
 
 def test_lasting_push_below_the_threshold_is_not_taken_for_a_weight_that_cannot_be(panda):
@@ -149,37 +148,39 @@ def test_lasting_push_below_the_threshold_is_not_taken_for_a_weight_that_cannot_
     plant.run(controller, hold(panda), 300, UNTOUCHED)
     plant.push("link4", (0.0, 0.0, -22.0))
     plant.run(controller, hold(panda), 5000, UNTOUCHED)
-    assert np.abs(controller.record["state"]["mass_error"]).max() < 5 * SAFE.mass_uncertainty
+    assert (
+        np.abs(controller.record["state"]["link_masses"]["mass_error"]).max() < 5 * SAFE.identification.mass_uncertainty
+    )
 
 
 def test_what_is_learned_does_not_move_the_arm(panda):
     """In free motion the command is that of an arm which learns nothing, but for what joint stops make of it."""
     commands = []
-    for config in (SAFE, replace(SAFE, mass_uncertainty=0.0, payload_uncertainty_kg=0.0)):
+    for config in (SAFE, SAFE.with_(mass_uncertainty=0.0, payload_uncertainty_kg=0.0)):
         plant, controller = Plant(panda, model=heavier(panda, 1.03)), controller_at(panda, config)
         seen = []
-        for offset in WAY:
+        for offset in PATH:
             for _ in range(300):
                 seen.append(plant.run(controller, reach(panda, offset), 1, UNTOUCHED).torque)
         assert not controller.record["output"]["mode"]
         commands.append(seen)
         if config is SAFE:
-            assert np.abs(controller.record["state"]["unweighed"]).max() > 0.3
+            assert np.abs(controller.record["state"]["link_masses"]["gravity_correction"]).max() > 0.3
     assert_allclose(commands[0], commands[1], rtol=0, atol=0.06)
 
 
 @pytest.mark.parametrize("wrench", [None, UNTOUCHED])
 def test_not_knowing_does_not_grow_beyond_what_it_was_at_first(panda, wrench):
-    """Without a force sensor nothing is weighed; thresholds would otherwise rise until nothing is found."""
+    """Without a force sensor no mass is identified; thresholds would otherwise rise until nothing is detected."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.run(controller, hold(panda), 1, wrench)
-    first = controller.record["state"]["gravity_sigma"].copy()
+    first = controller.record["state"]["link_masses"]["gravity_sigma"].copy()
     plant.run(controller, hold(panda), 3000, wrench)
-    assert (controller.record["state"]["gravity_sigma"] <= first + 1e-9).all()
+    assert (controller.record["state"]["link_masses"]["gravity_sigma"] <= first + 1e-9).all()
 
 
 def test_a_threshold_without_end_keeps_the_torque_finite(panda):
-    plant, controller = Plant(panda), controller_at(panda, replace(SAFE, residual_threshold=np.inf))
-    out = plant.run(controller, reach(panda, WAY[0]), 300, UNTOUCHED)
+    plant, controller = Plant(panda), controller_at(panda, SAFE.with_(residual_threshold=np.inf))
+    out = plant.run(controller, reach(panda, PATH[0]), 300, UNTOUCHED)
     assert np.isfinite(out.torque).all()
     assert out.fault == "none"

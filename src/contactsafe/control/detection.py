@@ -1,0 +1,94 @@
+"""Detection: whether something touches the arm, a residual against a threshold of its own for each joint."""
+
+import numpy as np
+
+from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.core.compiled import compiled, inlined
+from contactsafe.core.stack import stack_vector
+from contactsafe.robot.friction import joint_friction_into
+
+_f = np.float64
+_i = np.int64
+
+_SIGMAS = 3.0
+"""A contact is what exceeds this many standard deviations of the weight that is not known yet."""
+
+
+def detection_dtype(n: int) -> np.dtype:
+    """Describe what detection remembers."""
+    return np.dtype(
+        [
+            ("residual", _f, (n,)),  # detection residual: what is held against the thresholds, N m
+            ("threshold", _f, (n,)),  # N m
+            ("model_uncertainty", _f, (n,)),  # of it, what friction, inertia and a late command may come to, N m
+            ("contact_ticks", _i),  # since contact began or ended
+            ("quiet_ticks", _i),  # since the residual was above what keeps a contact
+        ]
+    )
+
+
+@inlined
+def set_thresholds(
+    detection: Record,
+    observer: Record,
+    gravity_sigma: Vector,
+    qd: Vector,
+    CT_qd: Vector,
+    params: Record,
+    friction_coefficients: Matrix,
+) -> None:
+    """Set each joint's threshold to what is not known of the arm.
+
+    δ plus a fraction of friction and of inertial torque, whose model is not exact, plus what a late command is short
+    of, what the tool may have felt unseen, and the standard deviation of the gravity torque that is not identified.
+
+    Args:
+        detection: `detection_dtype` record; its thresholds are set.
+        observer: `observer_dtype` record.
+        gravity_sigma: standard deviation of the gravity torque, (n,), N m.
+        qd: (n,), rad/s.
+        CT_qd: Cᵀ q̇, (n,), N m.
+        params: of detection.
+        friction_coefficients: of the arm, (n, 3).
+    """
+    friction = joint_friction_into(friction_coefficients, qd, stack_vector(qd.shape[0]))
+    for i in range(qd.shape[0]):
+        inertial = abs(observer.momentum_rate[i]) + abs(CT_qd[i])
+        uncertainty = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
+        uncertainty += params.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
+        detection.model_uncertainty[i] = uncertainty
+        detection.threshold[i] = params.residual_threshold + uncertainty + _SIGMAS * gravity_sigma[i]
+
+
+@inlined
+def detect(detection: Record, in_contact: bool, ticks: int, params: Record) -> tuple[int, bool]:
+    """Return the furthest link whose joint exceeds its threshold, and whether the arm is in contact from now on.
+
+    Contact begins above the threshold; it ends after the dwell, once all joints have stayed below a fraction of it.
+
+    Args:
+        detection: `detection_dtype` record; its times are advanced.
+        in_contact: whether the arm was in contact.
+        ticks: that passed.
+        params: of detection.
+
+    Returns:
+        Link, 1 … n, 0 for none; and whether in contact.
+    """
+    link = _furthest_above(detection.residual, detection.threshold, 1.0)
+    kept = _furthest_above(detection.residual, detection.threshold, params.release_fraction) if in_contact else link
+    detection.contact_ticks += ticks
+    detection.quiet_ticks = 0 if kept != 0 else detection.quiet_ticks + ticks
+    if not in_contact:
+        return link, link != 0
+    released = detection.contact_ticks >= params.dwell_ticks and detection.quiet_ticks > params.release_ticks
+    return link, not released
+
+
+@compiled
+def _furthest_above(residual: Vector, threshold: Vector, fraction: float) -> int:
+    """Return the furthest joint from the base whose residual exceeds a fraction of its threshold, 1 … n; 0 for none."""
+    for i in range(residual.shape[0] - 1, -1, -1):
+        if abs(residual[i]) > fraction * threshold[i]:
+            return i + 1
+    return 0

@@ -1,0 +1,150 @@
+"""The free-space law (17): task impedance and posture, elastic parts kept apart from damping parts.
+
+What acts towards a target (stiffness, posture) is elastic: the task scale lowers it. What damps is never lowered.
+"""
+
+import numpy as np
+
+from contactsafe.control.codes import FREE
+from contactsafe.control.damping import (
+    joint_damping_limits,
+    loosen_limits,
+    scale_damping_into,
+    task_damping_into,
+)
+from contactsafe.control.laws import damping_wrench, stiffness_wrench
+from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.core.compiled import compiled, inlined
+from contactsafe.core.linalg import matvec_t_into, shorten
+from contactsafe.core.stack import stack_vector
+
+_f = np.float64
+
+
+def impedance_dtype(n: int) -> np.dtype:
+    """Describe the gains in force."""
+    return np.dtype(
+        [
+            ("K_task", _f, (6,)),  # 1/s²
+            ("D_task", _f, (6,)),  # 1/s
+            ("task_damping", _f),  # largest of the task's, 1/s
+            ("damping_limit", _f, (n,)),  # what dampers of each joint may come to, N m s/rad
+            ("joint_damping", _f, (n,)),  # what they come to, N m s/rad
+            ("damping_scale", _f, (n,)),  # of each joint's damping in force
+        ]
+    )
+
+
+@compiled
+def passive_step(
+    K: Vector, D: Vector, K_wanted: Vector, D_wanted: Vector, dt: float, damping_min: float, limited: bool
+) -> None:
+    """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
+
+    Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016, eq. 12), each axis by
+    itself. Falling gains are free.
+
+    Args:
+        K, D: in force, (6,), 1/s² and 1/s; updated.
+        K_wanted, D_wanted: (6,).
+        dt: tick, s.
+        damping_min: α, least damping that may ever be asked for, 1/s.
+        limited: whether to limit at all.
+    """
+    for i in range(6):
+        rise = K_wanted[i] - K[i] + damping_min * (D_wanted[i] - D[i])
+        most = 2.0 * damping_min * K[i] * dt
+        fraction = most / rise if limited and rise > most else 1.0
+        K[i] += fraction * (K_wanted[i] - K[i])
+        D[i] += fraction * (D_wanted[i] - D[i])
+
+
+@inlined
+def follow_gains(impedance: Record, target: Record, dt: float, params: Record) -> None:
+    """Move the gains in force towards those of the target."""
+    passive_step(
+        impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.damping_range[0],
+        params.passive_gains != 0,
+    )  # fmt: skip
+
+
+@inlined
+def task_wrenches(
+    impedance: Record, Lambda: Matrix, error: Vector, dynamics: Record, delay_s: float, params: Record
+) -> tuple[Vector, Vector]:
+    """Return elastic and damping wrench at the tool, (4), (6,) each, N and N m; and note the largest damping.
+
+    Args:
+        impedance: `impedance_dtype` record; its `task_damping` is set.
+        Lambda: task inertia, (6, 6).
+        error: x_d − x, (6,), m and rad.
+        dynamics: `dynamics_dtype` record.
+        delay_s: of the loop, s.
+        params: of impedance.
+    """
+    F_spring = stiffness_wrench(
+        Lambda, error, impedance.K_task, params.task_acceleration_max_m_s2, params.task_acceleration_max_rad_s2
+    )
+    D_task = task_damping_into(impedance.K_task, impedance.D_task, delay_s, stack_vector(6))
+    impedance.task_damping = D_task.max()
+    return F_spring, damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
+
+
+@inlined
+def set_joint_damping(impedance: Record, mode: int, M_inv: Matrix, params: Record) -> None:
+    """Set the part of each joint's damping that its inertia takes beside the damping of the task.
+
+    Args:
+        impedance: `impedance_dtype` record; updated.
+        mode: in contact more damping is asked for.
+        M_inv: inverse joint inertia, (n, n), 1/(kg m²).
+        params: `params_dtype` record.
+    """
+    reaction, rate = params.reaction, params.limits.damping_rate - impedance.task_damping
+    joint_damping_limits(M_inv, rate, impedance.damping_limit)
+    impedance.joint_damping[:] = params.impedance.D_posture
+    if mode != FREE:
+        for i in range(impedance.joint_damping.shape[0]):
+            posture = max(params.impedance.D_posture[i], reaction.null_damping)
+            impedance.joint_damping[i] = posture + reaction.contact_damping
+    if (impedance.joint_damping > impedance.damping_limit).any():
+        loosen_limits(M_inv, rate, impedance.damping_limit)
+    scale_damping_into(impedance.joint_damping, impedance.damping_limit, impedance.damping_scale)
+    for i in range(impedance.joint_damping.shape[0]):
+        impedance.joint_damping[i] *= impedance.damping_scale[i]
+
+
+@inlined
+def posture_torques_into(
+    impedance: Record, arm: Record, q_posture: Vector, scale: float, params: Record, elastic: Vector, damping: Vector
+) -> None:
+    """Fill elastic and damping torque of the posture task, K2 (q_d − q) and −D2 q̇, (15), (n,) each, N m.
+
+    Args:
+        impedance: `impedance_dtype` record.
+        arm: joints of the state.
+        q_posture: q_d, (n,), rad.
+        scale: of the stiffness in force.
+        params: `params_dtype` record.
+        elastic, damping: (n,), N m; filled.
+    """
+    known, delay_s = params.impedance, params.clock.loop_delay_s
+    for i in range(elastic.shape[0]):
+        elastic[i] = q_posture[i] - arm.q[i]
+    shorten(elastic, known.posture_error_max_rad)
+    for i in range(elastic.shape[0]):
+        D = impedance.damping_scale[i] * known.D_posture[i]
+        elastic[i] *= scale * min(known.K_posture[i], D / (2.0 * delay_s))
+        damping[i] = -D * arm.qd[i]
+
+
+@inlined
+def compose_into(J: Matrix, wrench: Vector, N: Matrix, posture: Vector, out: Vector) -> Vector:
+    """Fill Jᵀ F + Nᵀ Γ, (n,), N m: a task, and a posture in a null space of it."""
+    n = out.shape[0]
+    of_task, of_posture = stack_vector(n), stack_vector(n)
+    matvec_t_into(J, wrench, of_task)
+    matvec_t_into(N, posture, of_posture)
+    for i in range(n):
+        out[i] = of_task[i] + of_posture[i]
+    return out

@@ -1,0 +1,114 @@
+"""What goes into a step of the controller, and what comes out."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contactsafe.control.codes import FAULTS, FREE, KINDS, LIMITS
+from contactsafe.robot.arm import Pose
+
+
+class Measurement(NamedTuple):
+    """What the sensors say at one tick.
+
+    Attributes:
+        q: joint positions, (n,), rad.
+        qd: joint velocities, (n,), rad/s.
+        wrench_ee: wrench of the environment on the end effector at the tool point, world axes, (6,), N and N m;
+            None without a force sensor.
+        time: when it was measured, s, by any clock that only goes forward; None where it is not known: then a tick
+            counts as one tick of time, unless the joints went further than that.
+    """
+
+    q: np.ndarray
+    qd: np.ndarray
+    wrench_ee: np.ndarray | None = None
+    time: float | None = None
+
+
+class Target(NamedTuple):
+    """What a policy asks for; held until the next.
+
+    Attributes:
+        pose: desired tool pose, world.
+        stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
+        damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
+        posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever path led there
+            (`InverseKinematics.posture_near`).
+    """
+
+    pose: Pose
+    stiffness: np.ndarray
+    damping: np.ndarray | None = None
+    posture: np.ndarray | None = None
+
+
+class Contact(NamedTuple):
+    """What is known of a contact on the arm.
+
+    Attributes:
+        in_contact: whether the contact-aware law is in force.
+        link: found in contact on the arm's surface, or without one the furthest whose joint residual exceeds the
+            threshold, 1 … n; 0 for none.
+        kind: 'obstacle', with which the arm complies, or 'push', which it rejects: one on the arm counts as an
+            obstacle until receding from it has shown that it pushes; 'tool' where the tool alone touches something;
+            'none'.
+        torque: estimated joint torque of the contact, (n,), N m (the fast residual).
+    """
+
+    in_contact: bool
+    link: int
+    kind: str
+    torque: np.ndarray
+
+
+class Output(NamedTuple):
+    """What one tick gives back.
+
+    Attributes:
+        torque: joint command including gravity, (n,), N m.
+        contact: on the arm.
+        residual: estimated external joint torque the law compensates, (n,), N m.
+        error: x_d − x, position and rotation vector, (6,), m and rad; of the arm as predicted while `bridged` is not 0.
+        limited_by: what took something off the task or the command: some of 'contact' (the bound on the force along
+            it), 'tool force' (`tool_force_limit_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range'
+            (joint range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
+        fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
+        bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
+        target_late: whether no new target came for so long that the tool is brought to rest.
+        braked: whether the arm is braked until `reset`, for the reason that `fault` gives.
+    """
+
+    torque: np.ndarray
+    contact: Contact
+    residual: np.ndarray
+    error: np.ndarray
+    limited_by: tuple[str, ...]
+    fault: str
+    bridged: int = 0
+    target_late: bool = False
+    braked: bool = False
+
+
+_LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum_ in range(2 * max(LIMITS))]
+
+
+def output_of(out: dict[str, np.ndarray]) -> Output:
+    """Return what a tick reports, from the fields of an `output_dtype` record."""
+    contact = Contact(
+        in_contact=bool(out["mode"] != FREE),
+        link=int(out["link"]),
+        kind=KINDS[int(out["kind"])],
+        torque=out["residual_fast"].copy(),
+    )
+    return Output(
+        torque=out["torque"].copy(),
+        contact=contact,
+        residual=out["residual"].copy(),
+        error=out["error"].copy(),
+        limited_by=_LIMITED_BY[int(out["limited_by"])],
+        fault=FAULTS[int(out["fault"])],
+        bridged=int(out["bridged"]),
+        target_late=bool(out["target_late"]),
+        braked=bool(out["braked"]),
+    )

@@ -1,0 +1,82 @@
+"""Identification: what of a residual is the tool's wrench and what the arm's contact, and the force at the tool."""
+
+import numpy as np
+
+from contactsafe.control.laws import line_of_action_misses_tool, observer_step
+from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.core.compiled import inlined
+from contactsafe.core.linalg import matvec_t_into
+from contactsafe.core.stack import stack_vector
+
+_f = np.float64
+
+
+def tool_wrench_dtype(n: int) -> np.dtype:
+    """Describe what is remembered of the tool's wrench and of the arm's contact."""
+    return np.dtype(
+        [
+            ("wrench", _f, (6,)),  # of the environment on the tool, where no sensor says it, N and N m
+            ("force", _f, (3,)),  # on the tool, by the sensor or the residual, smoothed, N
+            ("arm_torque", _f, (n,)),  # compensating residual less the tool's part, N m
+            ("arm_torque_fast", _f, (n,)),  # the fast one less the tool's part, N m
+        ]
+    )
+
+
+@inlined
+def separate_tool_wrench(
+    tool: Record,
+    detection_residual: Vector,
+    observer: Record,
+    J: Matrix,
+    J_bar: Matrix,
+    memory_gain: float,
+    params: Record,
+) -> None:
+    """Split the residual into the tool's part and the arm's, where no force sensor does.
+
+    A wrench at the tool never shows in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force
+    whose line passes far from the tool; of the rest, the wrench that was there before the contact stays the tool's.
+
+    Args:
+        tool: `tool_wrench_dtype` record; advanced.
+        detection_residual: (n,), N m; filled.
+        observer: `observer_dtype` record.
+        J: task Jacobian, (6, n).
+        J_bar: its dynamically consistent inverse, (n, 6).
+        memory_gain: of the tool's wrench in this tick; 0 while the arm is in contact.
+        params: of identification.
+    """
+    n = detection_residual.shape[0]
+    tau_tool = stack_vector(n)
+    wrench = matvec_t_into(J_bar, observer.residual_fast, stack_vector(6))
+    detection_residual[:] = observer.residual_fast
+    if not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
+        matvec_t_into(J, wrench, tau_tool)
+        for i in range(n):
+            detection_residual[i] -= tau_tool[i]
+    if memory_gain > 0.0:
+        observer_step(tool.wrench, memory_gain, wrench)
+    matvec_t_into(J, tool.wrench, tau_tool)
+    for i in range(n):
+        tool.arm_torque[i] = observer.residual[i] - tau_tool[i]
+        tool.arm_torque_fast[i] = observer.residual_fast[i] - tau_tool[i]
+
+
+@inlined
+def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Record) -> None:
+    """Take all of the residual for the arm's contact: the tool's wrench is known, or nothing tells it apart."""
+    detection_residual[:] = observer.residual_fast
+    tool.arm_torque[:] = observer.residual
+    tool.arm_torque_fast[:] = observer.residual_fast
+
+
+@inlined
+def follow_tool_force(tool: Record, arm: Record, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
+    """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r."""
+    wrench = stack_vector(6)
+    if arm.has_wrench != 0:
+        wrench[:] = arm.wrench_ee
+    else:
+        matvec_t_into(J_bar, residual_fast, wrench)
+    observer_step(tool.force, gain, wrench[:3])
