@@ -144,11 +144,11 @@ def nearest_foreground_error(
 
 @torch.no_grad()
 def _pairs(vae: VAE, data: MaskDataset, window_m: float, count: int) -> tuple[torch.Tensor, torch.Tensor]:
-    latents, vectors = [], []
+    pairs = []
     for index in batches(min(count, len(data))):
         image = data.images(index)
-        latents.append(vae.encode(torch.from_numpy(image))[0])
-        vectors.append(torch.from_numpy(nearest_foreground(image, window_m)).float())
-    latents, vectors = torch.cat(latents), torch.cat(vectors)
+        latent = vae.encode(torch.from_numpy(image))[0]
+        pairs.append((latent, torch.from_numpy(nearest_foreground(image, window_m)).float()))
+    latents, vectors = (torch.cat(pieces) for pieces in zip(*pairs, strict=True))
     seen = torch.isfinite(vectors[:, 0])
     return latents[seen], vectors[seen]

@@ -1,5 +1,6 @@
 """Train a policy on what a task lets it observe, with any algorithm of Stable-Baselines3; export and evaluate it."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -25,6 +26,9 @@ from contactsafe.policy.perception import NO_IMAGE
 from contactsafe.policy.policy import Policy
 from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
+
+_NEVER = sys.maxsize
+"""Stable-Baselines3 logs once so many iterations; `Recorder` logs in its place."""
 
 MakeEnv = Callable[[int], Any]
 """`make_env(num_envs)` returns a task's vector environment."""
@@ -131,7 +135,7 @@ def _learn(
     remaining = config.total_steps - model.num_timesteps
     if remaining > 0:
         model.set_logger(Logger(str(config.out), [Curves(config.out, model.num_timesteps)]))
-        model.learn(remaining, callback=recorder, log_interval=None, reset_num_timesteps=False)
+        model.learn(remaining, callback=recorder, log_interval=_NEVER, reset_num_timesteps=False)
         recorder.finish()
     return model, {"steps": run.saved_steps, "minutes": round(recorder.minutes(), 1)}
 
