@@ -36,6 +36,7 @@ def listed(names):
 
 DESCRIPTION = {
     "task": "wiping",
+    "conditions": {"controller": "safe", "gains": "learned", "as_paper": False},
     "representation": "tool",
     "window_m": 0.64,
     "view_size": 32,
@@ -226,18 +227,19 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
     path.write_text(whole)
     rewrite(bundle, format=99)
-    assert refusal(bundle) == f"{path} has format 99, this version reads 4; export it anew, or upgrade"
-    rewrite(bundle, format=4, rate_hz="60")
+    assert refusal(bundle) == f"{path} has format 99, this version reads 5; export it anew, or upgrade"
+    rewrite(bundle, format=5, rate_hz="60")
     assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
     rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
     assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"
     rewrite(bundle, window_m=0.64, observes=["pose", "truth"])
     assert refusal(bundle) == (
-        f"{path}: observes is ['pose', 'truth'], not some of pose, target, force; export it anew"
+        f"{path}: observes is ['pose', 'truth'], not a list of names and sizes of vectors, each once; "
+        "export the bundle anew"
     )
-    rewrite(bundle, observes=["pose"], actions=["x"])
+    rewrite(bundle, observes=listed(["pose"]), actions=["x"])
     assert refusal(bundle) == (
-        f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade"
+        f"{path}: actions are not those of this version's tasks; export the bundle anew, or upgrade"
     )
 
 
@@ -519,7 +521,7 @@ def test_a_number_of_900_000_digits_is_no_json(bundle):
 
 def test_a_name_that_stands_twice_in_the_manifest_is_refused(bundle):
     text = (bundle / "bundle.json").read_text()
-    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 4,', 1))
+    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 5,', 1))
     assert refusal(bundle) == (
         f"{bundle}/bundle.json says 'format' twice; the bundle is damaged, copy or export it anew"
     )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from contactsafe.learning.vec_env import EncodedVecEnv
 
-FORMAT = 5
+FORMAT = 6
 """Version of the checkpoint's layout."""
 
 

@@ -11,6 +11,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.checkpoints import run_folder, write_json
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.policy_config import PolicyConfig
@@ -19,10 +20,11 @@ from contactsafe.learning.run import Run, load_run
 from contactsafe.learning.settings import plain
 from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.learning.vision_encoder import VisionEncoder
+from contactsafe.policy.action_config import learned_actions
 from contactsafe.policy.bundle import FOLDER
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling, chosen
-from contactsafe.policy.perception import NO_IMAGE
+from contactsafe.policy.perception import NO_IMAGE, PAPER
 from contactsafe.policy.policy import Policy
 from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
@@ -66,7 +68,7 @@ def train_policy(
 def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
     """Return how to make a task's environments: those for training, and the held-out ones."""
     task = task_by_name(config.task)
-    training, nominal = task.training_config(config.randomise), task.training_config(False)
+    training, nominal = (task.training_config(randomise, config.conditions) for randomise in (config.randomise, False))
     return lambda n: make_vec(task.name, n, training), lambda n: make_vec(task.name, n, nominal)
 
 
@@ -74,7 +76,14 @@ def _encoder(config: PolicyConfig) -> VisionEncoder | None:
     """Load the vision encoder; None where the policy is to see no images."""
     if config.encoder is None or (config.task in TASKS and task_by_name(config.task).mask_sampler is None):
         return None
-    return VisionEncoder.load(config.encoder)
+    encoder = VisionEncoder.load(config.encoder)
+    found = encoder.description["representation"]
+    if config.as_paper and found != PAPER:
+        raise InvalidInputError(
+            f"the encoder in {config.encoder} is of representation {found}, and the paper's is of {PAPER}; run "
+            f"`contactsafe train vae --representation {PAPER} --out runs/vae_paper` and give that folder as --encoder"
+        )
+    return encoder
 
 
 def _train(
@@ -120,7 +129,8 @@ def encoded(raw_env: Any, encoder: VisionEncoder | None, config: PolicyConfig) -
         perception = encoder.perception(_homography(raw_env), config.encoder_threads)
         statistics = encoder.description["latent_mean"], encoder.description["latent_std"]
     scaling = ObservationScaling.from_statistics(vectors, *statistics)
-    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, dither)
+    repeat, actions = config.action_repeat, learned_actions(config.gains)
+    return EncodedVecEnv(raw_env, perception, scaling, repeat, config.reward_scale, dither, actions)
 
 
 def _learn(
@@ -162,6 +172,7 @@ def _describe(
         }
     return {
         "task": config.task,
+        "conditions": asdict(config.conditions),
         **image,
         "observes": [{"name": name, "size": spaces[name].shape[0]} for name in env.scaling.observes],
         "rate_hz": config.rate_hz,
