@@ -58,9 +58,11 @@ def test_words_say_otherwise(monkeypatch):
     assert told == [PpoConfig.for_task("insertion", num_envs=5, gains="low")]
 
 
-@pytest.mark.parametrize(("name", "known"), [("gains", "learned, low, middle, high"), ("controller", "paper, vices")])
+@pytest.mark.parametrize(
+    ("name", "known"), [("gains", "learned, low, middle, high"), ("controller", "vices, paper, safe")]
+)
 def test_a_name_that_is_unknown_is_told(name, known):
-    with pytest.raises(InvalidInputError, match=rf"{name} = 'none'; choose from .*{known}"):
+    with pytest.raises(InvalidInputError, match=rf"{name} = 'none'; choose from {known}"):
         Conditions(**{name: "none"})
 
 
