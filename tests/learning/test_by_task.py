@@ -196,4 +196,6 @@ def test_a_run_as_the_paper_has_it(paper_encoder, tmp_path, capsys):
     assert (bundle.observes, bundle.conditions) == ({"pose": 6}, Conditions("vices", "learned", True))
     capsys.readouterr()
     assert main(["evaluate", str(folder), "--episodes", "1", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["controller"] == "vices"
+    result = json.loads(capsys.readouterr().out)
+    assert (result["controller"], result["as_paper"]) == ("vices", True)
+    assert "gains" not in result

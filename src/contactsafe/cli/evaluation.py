@@ -10,9 +10,12 @@ import tyro
 from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress, task_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
+from contactsafe.policy.bundle import Bundle
+from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.policy import Policy
 from contactsafe.results.experiment import to_json
 from contactsafe.tasks import DEFAULT_TASK, ENGINES, make_vec, task_by_name
+from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, figures_of
 from contactsafe.tasks.base.figures import names
 from contactsafe.tasks.base.task import Task
@@ -70,7 +73,7 @@ def evaluate(arguments: Sequence[str]) -> None:
         seed = HELD_OUT_SEED + asked.seed
         results = evaluate_policy(policy, env, asked.episodes, seed, on_episode=lambda record: bar.update())
     env.close()
-    _show(asked, config.controller, results, names(figures_of(env)), _own_options(described))
+    _show(asked, _conditions(config, bundle), results, names(figures_of(env)), _own_options(described))
 
 
 def _options_of(task: Task) -> type:
@@ -94,14 +97,21 @@ def _own_options(task: Task) -> list[str]:
     return [*own[:2], "engine", *own[2:]]
 
 
-def _show(asked: Any, controller: str, results: dict[str, Any], meaning: Any, own: list[str]) -> None:
+def _conditions(config: TaskConfig, bundle: Bundle | None) -> dict[str, Any]:
+    """Return under what the episodes ran: the controller, and what else of a policy's conditions is not the default."""
+    gains = {} if config.action.gains == Conditions.gains else {"gains": config.action.gains}
+    as_paper = {"as_paper": True} if bundle is not None and bundle.conditions.as_paper else {}
+    return {"controller": config.controller, **gains, **as_paper}
+
+
+def _show(asked: Any, conditions: dict[str, Any], results: dict[str, Any], meaning: Any, own: list[str]) -> None:
     records = results.pop("records")
     task = {name: getattr(asked, name) for name in own}
     said = {
         "task": asked.task,
         "policy": asked.scripted or str(asked.bundle or "shipped"),
         "seed": asked.seed,
-        "controller": controller,
+        **conditions,
     }
     if asked.json:
         print(to_json({**results, **said, "options": task, "records": records}))

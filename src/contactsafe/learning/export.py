@@ -107,6 +107,11 @@ def to_onnx(module: nn.Module, examples: Sequence[torch.Tensor], inputs: Sequenc
             verbose=False,
         )
         model = onnx.load(path)
+    return _without_traces(model).SerializeToString()
+
+
+def _without_traces(model: onnx.ModelProto) -> onnx.ModelProto:
+    """Clear what the exporter notes of its own run."""
     # Stack traces and local paths are noted in there; they are nobody's business.
     graph = model.graph
     ports = (*graph.input, *graph.output, *graph.value_info)
@@ -114,7 +119,7 @@ def to_onnx(module: nn.Module, examples: Sequence[torch.Tensor], inputs: Sequenc
         if hasattr(entry, "metadata_props"):
             del entry.metadata_props[:]
         entry.doc_string = ""
-    return model.SerializeToString()
+    return model
 
 
 def compare(module: nn.Module, data: bytes, name: str, examples: Sequence[torch.Tensor], inputs: Sequence[str]) -> None:

@@ -155,25 +155,11 @@ def _describe(
 ) -> dict[str, Any]:
     """Return what the bundle says of a policy beside its models."""
     spaces: Any = env.env.single_observation_space
-    training: dict[str, Any] = {config.algorithm: _portable(plain(config))}
-    image: dict[str, Any] = {"representation": NO_IMAGE, "latent_size": 0}
-    if encoder is not None:
-        said = encoder.description
-        image = {
-            "representation": said["representation"],
-            "window_m": said["window_m"],
-            "view_size": said["size"],
-            "latent_size": encoder.latent_size,
-        }
-        training["encoder"] = {
-            key: _portable(value) if key == "config" else value
-            for key, value in said.items()
-            if not key.startswith("latent_")
-        }
+    training = {config.algorithm: _portable(plain(config)), **_encoder_training(encoder)}
     return {
         "task": config.task,
         "conditions": asdict(config.conditions),
-        **image,
+        **_image(encoder),
         "observes": [{"name": name, "size": spaces[name].shape[0]} for name in env.scaling.observes],
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
@@ -181,6 +167,23 @@ def _describe(
         "training": {**training, **effort},
         "results": {},
     }
+
+
+def _image(encoder: VisionEncoder | None) -> dict[str, Any]:
+    """Return what the bundle says of the pictures that a policy sees."""
+    if encoder is None:
+        return {"representation": NO_IMAGE, "latent_size": 0}
+    said = encoder.description
+    shape = {"representation": said["representation"], "window_m": said["window_m"], "view_size": said["size"]}
+    return {**shape, "latent_size": encoder.latent_size}
+
+
+def _encoder_training(encoder: VisionEncoder | None) -> dict[str, Any]:
+    """Return what the bundle says of how the encoder came about."""
+    if encoder is None:
+        return {}
+    said = {key: value for key, value in encoder.description.items() if not key.startswith("latent_")}
+    return {"encoder": {key: _portable(value) if key == "config" else value for key, value in said.items()}}
 
 
 def _portable(settings: dict[str, Any]) -> dict[str, Any]:

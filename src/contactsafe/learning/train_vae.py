@@ -103,17 +103,7 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
     torch.manual_seed(config.seed)
     vae = VAE(config.encoder)
     optimiser = torch.optim.Adam(vae.parameters(), lr=config.learning_rate)
-    first_epoch = 0
-    if config.resume:
-        state = load_checkpoint(out)
-        with refused_as(out):
-            check_same_config(entry(state, "config", dict), config, may_differ=_MAY_DIFFER)
-            check_like(entry(state, "model", dict), dict(vae.state_dict()), "model")
-            check_optimiser(entry(state, "optimiser", dict), optimiser, "optimiser")
-            first_epoch = whole(state, "epochs_done")
-        vae.load_state_dict(state["model"])
-        optimiser.load_state_dict(state["optimiser"])
-
+    first_epoch = _go_on(config, vae, optimiser, out) if config.resume else 0
     view = (config.representation, config.window_m, config.encoder.size)
     data = make_dataset(sample_masks, homography, config.images, config.seed, *view)
     held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_SEED, *view)
@@ -131,6 +121,19 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
     export_encoder(vae, out / ENCODER, report["size"])
     write_json(out / ENCODER_DESCRIPTION, report)
     return report
+
+
+def _go_on(config: VaeConfig, vae: VAE, optimiser: torch.optim.Optimizer, out: Path) -> int:
+    """Load network and optimiser from the checkpoint; return how many epochs they have seen."""
+    state = load_checkpoint(out)
+    with refused_as(out):
+        check_same_config(entry(state, "config", dict), config, may_differ=_MAY_DIFFER)
+        check_like(entry(state, "model", dict), dict(vae.state_dict()), "model")
+        check_optimiser(entry(state, "optimiser", dict), optimiser, "optimiser")
+        first_epoch = whole(state, "epochs_done")
+    vae.load_state_dict(state["model"])
+    optimiser.load_state_dict(state["optimiser"])
+    return first_epoch
 
 
 def _train_epoch(
