@@ -122,11 +122,9 @@ def _fitted_reader(
     centre, scale = latents.mean(0), latents.std(0).clamp(min=0.2)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        net = nn.Sequential(
-            nn.Linear(latents.shape[1], 128), nn.Tanh(), nn.Linear(128, 64), nn.Tanh(), nn.Linear(64, 2)
-        )
-    optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
-    unit = 0.1
+        first = nn.Linear(latents.shape[1], 128)
+        net = nn.Sequential(first, nn.Tanh(), nn.Linear(128, 64), nn.Tanh(), nn.Linear(64, 2))
+    optimiser, unit = torch.optim.Adam(net.parameters(), lr=2e-3), 0.1
     for step in range(steps):
         optimiser.param_groups[0]["lr"] = 2e-3 * (1.0 - step / steps)
         index = torch.randint(len(latents), (256,), generator=generator)

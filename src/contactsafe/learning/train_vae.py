@@ -91,14 +91,13 @@ def train_vae(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarr
         InvalidInputError: nothing to resume, or settings differ from those the run was started with.
     """
     with run_folder(config.out, config.resume) as out:
-        return _train(config, sample_masks, homography, out)
+        train = _report_log_polar if config.representation == "log_polar" else _train
+        report = train(config, sample_masks, homography, out)
+        write_json(out / ENCODER_DESCRIPTION, report)
+    return report
 
 
 def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray, out: Path) -> dict[str, Any]:
-    if config.representation == "log_polar":
-        report = _report_log_polar(config, sample_masks, homography)
-        write_json(out / ENCODER_DESCRIPTION, report)
-        return report
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     vae = VAE(config.encoder)
@@ -119,7 +118,6 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
 
     report = _report(vae, data, held_out, config)
     export_encoder(vae, out / ENCODER, report["size"])
-    write_json(out / ENCODER_DESCRIPTION, report)
     return report
 
 
@@ -161,7 +159,9 @@ def _train_epoch(
     return dict(zip(("loss", "reconstruction", "divergence"), totals / steps, strict=True))
 
 
-def _report_log_polar(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray) -> dict[str, Any]:
+def _report_log_polar(
+    config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray, out: Path
+) -> dict[str, Any]:
     """Measure the statistics of the log-polar features; they are of order one as they are."""
     masks, tools = sample_masks(config.held_out, config.seed)
     size = masks.shape[1]
