@@ -92,7 +92,7 @@ def no_bundles():
 
 @pytest.fixture(scope="module")
 def uninterrupted(encoder, tmp_path_factory):
-    """Give the last checkpoint of a run that was left alone."""
+    """Return the last checkpoint of a run that was left alone."""
     known = {}
 
     def run(config, make_env):

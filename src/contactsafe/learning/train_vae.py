@@ -50,7 +50,7 @@ class VaeConfig:
         learning_rate: of Adam; falls to a fiftieth along a half cosine.
         kl_weight: the paper's β.
         warmup_epochs: over which β rises from 0.
-        foreground_weight: how many blank pixels one ink pixel counts for.
+        foreground_weight: how many background pixels one foreground pixel counts for.
         probe_steps: of fitting the reader of "where is the nearest foreground" for the report; 0 for none.
         seed: of masks, weights and noise.
         threads: torch's. More than one crawls as soon as anything else wants a core.
