@@ -11,7 +11,7 @@ import numpy as np
 
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.policy.policy import Policy
-from contactsafe.tasks import make_engine
+from contactsafe.tasks import make_vec
 from contactsafe.tasks.base.evaluation import CONTACT_N
 from contactsafe.tasks.wiping.config import WipingConfig
 
@@ -22,8 +22,8 @@ WHOLE_STEP = 16  # ticks
 
 
 def wipe(engine, boards, seed):
-    """Let the policy wipe, and give each board's steps until it is clean: peak and mean force, ticks in contact."""
-    env = make_engine(engine, boards, WipingConfig())
+    """Let the policy wipe, and return each board's steps until it is clean: peak and mean force, ticks in contact."""
+    env = make_vec("wiping", boards, WipingConfig(), engine)
     policy = Policy(shipped_bundle("wiping"), env.unwrapped.camera_homography)
     observation, _ = env.reset(seed=seed)
     tasks, alive = env.unwrapped.tasks, np.ones(boards, bool)
@@ -32,14 +32,14 @@ def wipe(engine, boards, seed):
         observation, _, terminated, truncated, _ = env.step(policy.act(observation))
         alive &= ~(terminated | truncated)
         for i in np.flatnonzero(alive):
-            task, report = tasks.tasks[i], tasks.worlds.reports[i]
-            found[i].append((task["force_peak"], task["force_mean"], report["contact_ticks"]))
+            task, metrics = tasks.tasks[i], tasks.worlds.metrics[i]
+            found[i].append((task["force_peak"], task["force_mean"], metrics["contact_ticks"]))
     env.close()
     return [np.array(rows).reshape(-1, 3) for rows in found]
 
 
 def landings(peaks):
-    """Give the largest force of the first steps of every contact that follows some steps in the air."""
+    """Return the largest force of the first steps of every contact that follows some steps in the air."""
     found, air = [], AIR_STEPS
     for k, peak in enumerate(peaks):
         if peak > CONTACT_N and air >= AIR_STEPS:
@@ -49,8 +49,8 @@ def landings(peaks):
 
 
 def press(engine, speed):
-    """Press as deep as the target goes, to and fro along the board, and give the mean force over two seconds."""
-    env = make_engine(engine, 1, WipingConfig(controller="vices"))
+    """Press as deep as the target goes, to and fro along the board, and return the mean force over two seconds."""
+    env = make_vec("wiping", 1, WipingConfig(controller="vices"), engine)
     env.reset(seed=3)
     forces = []
     for k in range(240):

@@ -33,7 +33,7 @@ class Run(NamedTuple):
 
     Attributes:
         finite: whether every torque was a finite number.
-        overspeed: longest time that a joint was beyond its speed limit, as a share of what braking takes.
+        overspeed: longest time that a joint was beyond its speed limit, as a fraction of what braking takes.
         speed: largest joint speed, rad/s.
         energy: largest energy that the command had given the arm since the start, J.
         fault: of the controller.
@@ -86,7 +86,7 @@ def _quat(rng):
 
 
 def _link(body, rng, moment: float) -> float:
-    """Give a body a random inertia of this size, and a sphere that may touch things."""
+    """Set a random inertia of this size, and a sphere that may touch things."""
     radius = rng.uniform(0.02, 0.1)
     body.explicitinertial = True
     body.mass = min(moment / radius**2, 10.0)
@@ -98,7 +98,7 @@ def _link(body, rng, moment: float) -> float:
 
 
 def _strength(model, n, rng) -> np.ndarray:
-    """Give motors twice what gravity and a brisk acceleration ask for anywhere, and what a gear gives anyway, N m."""
+    """Compute motor torques: twice what gravity and a brisk acceleration need, and what any gear gives, N m."""
     data, M, need = mujoco.MjData(model), np.zeros((n, n)), np.zeros(n)
     for _ in range(50):
         data.qpos[:n] = rng.uniform(model.jnt_range[:n, 0], model.jnt_range[:n, 1])
@@ -121,12 +121,14 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
     corner = np.where(rng.random(arm.n) < 0.5, arm.q_min, arm.q_max)
     body, push = model.body(f"b{rng.integers(arm.n)}").id, rng.normal(size=3)
     push /= np.linalg.norm(push)
-    way = rng.normal(size=3)
-    way *= 0.2 / np.linalg.norm(way)
+    direction = rng.normal(size=3)
+    direction *= 0.2 / np.linalg.norm(direction)
     finite, over, longest, top, energy, most = True, np.zeros(arm.n), 0.0, 0.0, 0.0, 0.0
     for tick in range(LIMITS):
         if RELEASED <= tick < SWEPT:
-            target = hold._replace(pose=hold.pose._replace(position=hold.pose.position + _done(tick - RELEASED) * way))
+            target = hold._replace(
+                pose=hold.pose._replace(position=hold.pose.position + _done(tick - RELEASED) * direction)
+            )
         elif tick >= SWEPT:
             start = data.qpos[at.qpos].copy() if tick == SWEPT else start
             q = start + _done(tick - SWEPT) * (corner - start)
@@ -136,7 +138,7 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
             force = _pushed(model, data, arm, body, push, controller.record["dynamics"]["M_inv"])
             data.xfrc_applied[body, :3] = force * min((tick - HELD) / 20, 1.0)
         if tick == RELEASED:
-            data.mocap_pos[0] = data.site("tip").xpos + 0.5 * way
+            data.mocap_pos[0] = data.site("tip").xpos + 0.5 * direction
         elif tick == SWEPT:
             data.mocap_pos[0] = (0.0, 0.0, 100.0)
         out = controller.step(cs.Measurement(data.qpos[at.qpos], data.qvel[at.dof], wrench), target)
@@ -158,19 +160,19 @@ def run(model: mujoco.MjModel, config: cs.ControllerConfig, seed: int, sensor: b
 
 
 def _done(ticks: int) -> float:
-    """Share of a motion of 0.8 s that is done, without a jump of speed."""
-    share = min(ticks / 800, 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    """Compute the fraction of a motion of 0.8 s that is done, without a jump of speed."""
+    fraction = min(ticks / 800, 1.0)
+    return fraction**2 * (3.0 - 2.0 * fraction)
 
 
-def _pushed(model, data, arm, body: int, way: np.ndarray, M_inv: np.ndarray) -> np.ndarray:
-    """Give the force of a push in the posture of now: up to 30 N, a third of what the motors can, and no fling."""
+def _pushed(model, data, arm, body: int, direction: np.ndarray, M_inv: np.ndarray) -> np.ndarray:
+    """Compute the force of a push in the posture of now: up to 30 N, a third of what the motors can, and no fling."""
     J = np.zeros((3, model.nv))
     mujoco.mj_jacBodyCom(model, data, J, None, body)
-    torque = J[:, : arm.n].T @ way
+    torque = J[:, : arm.n].T @ direction
     flung = np.abs(M_inv @ torque).max()
     strong = np.max(np.abs(torque) / arm.tau_max)
-    return way * min(30.0, PUSH_RAD_S2 / max(flung, 1e-9), 0.3 / max(strong, 1e-9))
+    return direction * min(30.0, PUSH_RAD_S2 / max(flung, 1e-9), 0.3 / max(strong, 1e-9))
 
 
 def main() -> None:

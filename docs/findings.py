@@ -412,7 +412,7 @@ class _ForceAdded(Worlds):
             over = push_along(state["direction"].copy(), now["M_inv"].copy(), net) - self.bound_nm
             tau += max(over, 0.0) * state["direction"]
         tau = np.clip(np.clip(tau, before - step, before + step), -self.arm.tau_max, self.arm.tau_max)
-        state["tau"] = self.plants[i]["tau_delayed"] = tau
+        state["tau"] = self.records[i]["errors"]["tau_delayed"] = tau
 
 
 def force_added_drags_the_arm() -> None:

@@ -7,7 +7,7 @@ import contactsafe as cs
 
 
 def main(seconds: float = 1.5) -> float:
-    """Run, and give the tool's largest error under the push, m."""
+    """Run, and return the tool's largest error under the push, m."""
     arm = cs.robots.panda()
     model = arm.model  # a stand-in for your scene: any model whose first joints are the arm's
     data = mujoco.MjData(model)

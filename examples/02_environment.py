@@ -8,7 +8,7 @@ from contactsafe.policy.policy import Policy
 
 
 def main(seconds: float = 20.0) -> float:
-    """Wipe one board, and give the share of the ink that is left."""
+    """Wipe one board, and return the fraction of the ink that is left."""
     env = gymnasium.make("contactsafe/Wiping-v0")
     policy = Policy(shipped_bundle("wiping"), env.unwrapped.camera_homography)
     observation, info = env.reset(seed=7)

@@ -8,7 +8,7 @@ import contactsafe  # noqa: F401  (makes the environment known)
 
 
 def main(steps: int = 120) -> float:
-    """Step with random actions, and give environment steps a second."""
+    """Step with random actions, and return environment steps a second."""
     envs = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=16)
     envs.reset(seed=0)
     envs.action_space.seed(0)

@@ -19,7 +19,7 @@ def sweep(start: cs.Target, tick: int) -> cs.Target:
 
 
 def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[float, float, int]:
-    """Sweep; give the force on the box at its peak and over the last half second, N, and the link reported."""
+    """Sweep; return the force on the box at its peak and over the last half second, N, and the link reported."""
     model = mujoco.MjModel.from_xml_path(str(SCENE))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
@@ -41,12 +41,12 @@ def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[float, floa
 
 
 def main() -> dict[str, float]:
-    """Run with and without contact safety, and give the lasting force on the box, N."""
+    """Run with and without contact safety, and return the lasting force on the box, N."""
     lasting = {}
     for name, config in (("vices", cs.presets.vices()), ("safe", cs.presets.safe())):
         peak, lasting[name], link = collide(config)
         reported = f"contact reported on link {link}" if link else "no contact reported"
-        print(f"{name}: {reported}; the box feels {peak:.0f} N at the blow, {lasting[name]:.0f} N in the end")
+        print(f"{name}: {reported}; the box feels {peak:.0f} N at the impact, {lasting[name]:.0f} N in the end")
     return lasting
 
 

@@ -41,7 +41,7 @@ def forbid_sockets():
 
 
 def run_without_sockets(code, environment, folder, timeout=300):
-    """Run Python code in such a process; give what `subprocess.run` gives."""
+    """Run Python code in such a process; return what `subprocess.run` gives."""
     return subprocess.run(
         [sys.executable, "-c", f"from tests.sandbox import forbid_sockets; forbid_sockets()\n{code}"],
         env=environment, cwd=folder, capture_output=True, text=True, timeout=timeout, check=False,

@@ -28,7 +28,7 @@ UNKNOWN = "--{}: 'best' is unknown; choose from vices, paper, safe; see contacts
 
 
 def mistake(capsys, *words):
-    """Run a command that must fail by its user's fault; give the one line it says."""
+    """Run a command that must fail by its user's fault; return the one line it says."""
     assert main(list(words)) == 1
     out, err = capsys.readouterr()
     assert out == ""
@@ -366,6 +366,6 @@ def test_evaluate_says_how_the_policy_did(bundle, capsys):
 def test_evaluate_explains_every_figure_it_prints(bundle, capsys):
     assert main(["evaluate", str(bundle), "--episodes", "1", "--seed", "3"]) == 0
     asked, *rows = capsys.readouterr().out.splitlines()
-    assert asked.startswith(f"task wiping, policy {bundle}, seed 3, controller safe, boards strokes")
+    assert asked.startswith(f"task wiping, policy {bundle}, seed 3, controller safe, pushed False, boards strokes")
     assert [row.split()[0] for row in rows] == [figure.name for figure in FIGURES]
     assert all(figure.doc in row for figure, row in zip(FIGURES, rows, strict=True))

@@ -17,7 +17,6 @@ import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv
 
 import contactsafe as cs
 from contactsafe.control.records import controller_dtype
@@ -32,16 +31,23 @@ from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.worlds import Worlds
+from contactsafe.tasks.base.environment import TaskEnv
+from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.base.scripted import RandomPolicy
+from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scripted import SpiralSearch, StraightDown
+from contactsafe.tasks.insertion.tasks import InsertionTasks
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.tasks.wiping.sampling import MaskSampler
 from contactsafe.tasks.wiping.scenes import Wiping
-from contactsafe.tasks.wiping.scripted import NearestInk, RandomPolicy, Raster
+from contactsafe.tasks.wiping.scripted import NearestInk, Raster
 from contactsafe.tasks.wiping.tasks import WipingTasks
 from contactsafe.tasks.wiping.whiteboard import Whiteboard
 
 VARIED = WipingConfig(randomisation=Randomisation.broad(), pushes=Pushes())
+PUSHED = InsertionConfig(pushes=Pushes())
 RNG = np.random.default_rng(0)
 ACTIONS = RNG.uniform(-1.0, 1.0, (64, 2, 18)).astype(np.float32)
 
@@ -54,7 +60,7 @@ def observation(n=2):
 
 
 def homography():
-    return WipingTasks().worlds.homography
+    return WipingTasks().boards.homography
 
 
 # What each does next, as arrays; called again it goes on from there.
@@ -88,18 +94,18 @@ def drive(controller):
 
 def run_worlds(worlds):
     worlds.run(5)
-    return [worlds.plants["q_seen"].copy(), worlds.controllers["output"]["torque"].copy(), worlds.render().copy()]
+    return [worlds.records["truth"]["q"].copy(), worlds.controllers["output"]["torque"].copy()]
 
 
 def run_tasks(tasks):
     step = int(tasks.tasks["steps"][0])
     tasks.step(ACTIONS[step, : tasks.worlds.n])
-    return [*tasks.observation().values(), tasks.reward, tasks.worlds.plants["q_seen"].copy()]
+    return [*tasks.observation().values(), tasks.reward, tasks.worlds.records["errors"]["q_seen"].copy()]
 
 
 def run_episodes(episodes):
     episodes.step(np.full((episodes.worlds.n, 18), 0.3))
-    return [episodes.observation()["pose"], episodes.curves()["ink_left"], episodes.pictures()]
+    return [*episodes.observation().values(), *episodes.curves().values(), episodes.pictures()]
 
 
 def step_env(env):
@@ -117,23 +123,30 @@ def step_envs(envs):
 def vary(variation):
     variation.draw(0, np.random.default_rng(abs(int(1e9 * variation.drawn["payload_kg"][0]))))
     variation.look_first(0)
-    return [variation._worlds.models[0].body_mass.copy(), variation._worlds.masks.copy()]
+    return [variation._worlds.models[0].body_mass.copy(), variation._boards.masks.copy()]
 
 
-def push(pusher):
-    pusher._worlds.plants["tick"] += 5000
-    pusher.step()
-    return [pusher._worlds.plants["push_force"].copy()]
+def push(schedule):
+    schedule._worlds.records["tick"] += 5000
+    schedule.step()
+    return [schedule._worlds.records["push"]["force"].copy()]
 
 
 def play(playback):
     playback.step()
-    return [playback.worlds.plants["q_seen"].copy(), playback._tool.copy()]
+    return [playback.worlds.records["errors"]["q_seen"].copy(), playback._tool.copy()]
 
 
 def draw(board):
     board.sample_random(np.random.default_rng(board.ink_cells))
     return [board.cells.copy()]
+
+
+def draw_all(boards):
+    for i, board in enumerate(boards.boards):
+        board.sample_random(np.random.default_rng(int(boards.ink_cells()[i])))
+    boards.enter_changed()
+    return [boards.cells.copy(), boards.ink_cells(), boards.ink_index.shown.copy()]
 
 
 def sample(sampler):
@@ -151,12 +164,17 @@ def act(policy):
     return [policy.act(observation()) for _ in range(3)]
 
 
+def search(script):
+    seen = {"offset": np.zeros((2, 6)), "target": np.zeros((2, 18)), "force": np.full((2, 3), 4.0)}
+    return [script.act(seen) for _ in range(3)]
+
+
 def perceive(perception):
     seen = observation()
     return [perception(seen["mask"], seen["pose"])]
 
 
-def share(threads):
+def compute(threads):
     return [threads.submit(np.square, k).result() for k in range(4)]
 
 
@@ -182,17 +200,23 @@ def worlds(kind=Worlds):
     made = kind(cs.robots.panda(), n=2, seed=3)
     for i in range(2):
         made.reset(i, made.arm.home)
-        made.boards[i].sample_random(np.random.default_rng(i))
-        made.enter_ink(i)
     made.push(0, "link4", (0.0, 0.0, 0.0), (0.0, 20.0, 0.0), 0.001, 1.0)
     return made
 
 
-def tasks(config=VARIED):
-    made = WipingTasks(config, 2, 3)
+def tasks(config=VARIED, kind=WipingTasks):
+    made = kind(config, 2, 3)
     for i in range(2):
         made.reset(i, np.random.default_rng(i))
     return made
+
+
+def inserting():
+    return tasks(PUSHED, InsertionTasks)
+
+
+def inserting_episodes():
+    return TaskEpisodes(InsertionTasks(PUSHED, 2, [0, 1]), [0, 1])
 
 
 def env():
@@ -256,7 +280,7 @@ def photographed():
 
 
 def photographer():
-    return photographed()._sight._photographers[0]
+    return photographed()._photographs._photographers[0]
 
 
 def take(photographer):
@@ -280,17 +304,20 @@ ACTORS = {
     "InverseKinematics": (lambda: InverseKinematics(cs.robots.panda()), solve),
     "Controller": (begun(controller, drive), drive),
     "Worlds": (begun(worlds, run_worlds), run_worlds),
-    "Whiteboard": (lambda: Whiteboard(VARIED.world.board), draw),
+    "Whiteboard": (lambda: Whiteboard(VARIED.board), draw),
     "Variation": (lambda: tasks()._variation, vary),
-    "Pusher": (lambda: tasks()._pusher, push),
+    "Whiteboards": (begun(lambda: tasks().boards, draw_all), draw_all),
+    "PushSchedule": (lambda: tasks()._pushes, push),
     "WipingTasks": (begun(tasks, run_tasks), run_tasks),
-    "WipingEnv": (begun(bare_env, step_env), step_env),
-    "wrapped WipingEnv": (begun(env, step_env), step_env),
-    "WipingVectorEnv": (begun(envs, step_envs), step_envs),
+    "InsertionTasks": (begun(inserting, run_tasks), run_tasks),
+    "TaskEnv": (begun(bare_env, step_env), step_env),
+    "wrapped TaskEnv": (begun(env, step_env), step_env),
+    "TaskVectorEnv": (begun(envs, step_envs), step_envs),
+    "TaskEpisodes": (begun(inserting_episodes, run_episodes), run_episodes),
     "MaskSampler": (MaskSampler, sample),
     "Photographer": (begun(photographer, take), take),
     "PhotographSource": (begun(photographed, run_tasks), run_tasks),
-    "Segmenter": (lambda: photographed()._sight._segmenter, segment),
+    "Segmenter": (lambda: photographed()._photographs._segmenter, segment),
     "Playback": (begun(playback, play), play),
     "LateWorlds": (begun(late_worlds, run_worlds), run_worlds),
     "LatePlayback": (begun(late_playback, play), play),
@@ -300,8 +327,10 @@ ACTORS = {
     "EncodedVecEnv": (begun(encoded, step_encoded), step_encoded),
     "Raster": (begun(lambda: Raster(VARIED, 2), lambda r: [r.act(observation())]), lambda r: [r.act(observation())]),
     "NearestInk": (lambda: NearestInk(VARIED, 2, homography()), lambda r: [r.act(observation())]),
+    "SpiralSearch": (begun(lambda: SpiralSearch(PUSHED, 2), search), search),
+    "StraightDown": (begun(lambda: StraightDown(PUSHED, 2), search), search),
     "RandomPolicy": (lambda: RandomPolicy(2, 0), lambda r: [r.act(observation())]),
-    "Threads": (begun(lambda: Threads(2), share), share),
+    "Threads": (begun(lambda: Threads(2), compute), compute),
     "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
     "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Plotter": (plotter, lambda p: [p._count]),
@@ -311,8 +340,8 @@ ACTORS = {
 NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
 """PyTorch's own: it copies them."""
 
-IN_PYBULLET = {"BulletPlant", "BulletWorlds", "BulletTasks", "WipingBulletEnv", "WipingBulletVectorEnv"}
-"""Refused, see the test."""
+BASES = {"Independent", "Tasks"}
+"""Nothing by themselves: their subclasses have entries."""
 
 
 def public_classes():
@@ -337,7 +366,7 @@ def is_plain(kind):
 
 
 def test_every_public_class_has_an_entry():
-    known = {*ACTORS, *NETWORKS, *IN_PYBULLET, "Independent", "Call"}  # the last is how a model file is read
+    known = {*ACTORS, *NETWORKS, *BASES, "Call"}  # the last is how a model file is read
     missing = [
         name for name, kind in public_classes() if not (name in known or is_plain(kind) or issubclass(kind, Unique))
     ]
@@ -365,10 +394,10 @@ def test_a_copy_goes_on_as_the_original_apart_from_it_and_outlives_it(name):
         pytest.importorskip("stable_baselines3")
     make, go_on = ACTORS[name]
     original = make()
-    copies = {way: of(original) for way, of in COPIES.items()}
+    copies = {kind: of(original) for kind, of in COPIES.items()}
     if isinstance(original, gymnasium.Wrapper):
         del copies["shallow"]  # Gymnasium's, not ours: what it wraps stays the same
-    outcomes = {way: go_on(copied) for way, copied in copies.items()}
+    outcomes = {kind: go_on(copied) for kind, copied in copies.items()}
     expected = go_on(original)
     survivor = copy.deepcopy(original)
     next_expected = go_on(original)
@@ -412,12 +441,17 @@ def test_forked_ones_go_on_in_the_child_and_do_not_wait_for_threads_that_stayed_
         _INHERITED.clear()
 
 
-def test_worlds_in_pybullet_refuse_to_be_copied():
+@pytest.mark.parametrize("what", ["environment", "tasks", "worlds", "backend"])
+def test_worlds_in_pybullet_refuse_to_be_copied(what):
     pytest.importorskip("pybullet")
-    env = gymnasium.make("contactsafe/WipingBullet-v0")
+    env = gymnasium.make("contactsafe/Wiping-v0", engine="pybullet")
+    tasks = env.unwrapped.tasks
+    held = {
+        "environment": env.unwrapped, "tasks": tasks, "worlds": tasks.worlds, "backend": tasks.worlds.backends[0],
+    }  # fmt: skip
     for of in COPIES.values():
         with pytest.raises(InvalidInputError) as caught:
-            of(env.unwrapped)
+            of(held[what])
         assert str(caught.value) == (
             "worlds in PyBullet cannot be copied or pickled, they live in a client of their own; make them where they "
             "are to run, or take the MuJoCo engine"
@@ -453,9 +487,9 @@ def test_controllers_that_share_records_are_copied_with_them():
 
 
 def test_what_a_user_hung_on_a_subclass_goes_along():
-    class Mine(WipingEnv):
+    class Mine(TaskEnv):
         def __init__(self):
-            super().__init__(VARIED)
+            super().__init__("wiping", VARIED)
             self.seen = []
 
     mine = Mine()

@@ -28,7 +28,7 @@ def commands(program: str) -> list[str]:
 
 @functools.cache
 def help_of(*words: str) -> str:
-    """Give the help text of a subcommand; fails where there is no such subcommand."""
+    """Return the help text of a subcommand; fails where there is no such subcommand."""
     code = "import sys; from contactsafe.cli import main; sys.exit(main())"
     done = subprocess.run([sys.executable, "-c", code, *words, "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"contactsafe {' '.join(words)} --help: {done.stdout}{done.stderr}"

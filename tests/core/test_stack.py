@@ -32,7 +32,7 @@ def test_rows_and_columns_stand_where_they_belong(m, n):
 
 @compiled
 def _deep(n):
-    """Give n!, by a vector of its own in every call."""
+    """Return n!, by a vector of its own in every call."""
     mine = stack_vector(2)
     mine[0], mine[1] = n, 1.0
     if n > 1:

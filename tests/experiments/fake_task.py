@@ -10,6 +10,8 @@ from contactsafe.robot import robots
 from contactsafe.robot.panda import PANDA, WIPER
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
+from contactsafe.tasks.wiping.board import Camera
+from contactsafe.tasks.wiping.camera import plane_homography
 
 SPEED_M_S, GOAL_M = 0.3, 0.05
 START = np.array([0.0, 0.3, 0.0, -2.2, 0.0, 2.5, 0.785])
@@ -47,7 +49,7 @@ class ReachingEpisodes:
 
     @property
     def camera_homography(self):
-        return self.worlds.homography
+        return plane_homography(Camera(), 0.01)
 
     def observation(self):
         n = self.worlds.n
@@ -69,7 +71,7 @@ class ReachingEpisodes:
             picture.flat[: seed + 1] = 1  # the more, the larger its seed
         return cells
 
-    def parts(self):
+    def timed(self):
         return {"nothing": (lambda: None, 10)}
 
 

@@ -16,7 +16,7 @@ TASK = Reaching()
 
 @pytest.fixture(scope="module")
 def config():
-    return ExperimentConfig(("vices", "safe"), 2, 3, task=TASK, bundle=Bundle.load(shipped_bundle()))
+    return ExperimentConfig(("vices", "safe"), 2, 3, task=TASK, bundle=Bundle.load(shipped_bundle("wiping")))
 
 
 @pytest.fixture(scope="module")

@@ -142,7 +142,7 @@ def test_a_playback_runs_a_single_tick_of_what_is_over():
     while play.running.any():
         before = play.running.copy()
         ticks.append(play.step())
-        assert (worlds.reports["ticks"] == np.where(before, ticks[-1], 1)).all()
+        assert (worlds.metrics["ticks"] == np.where(before, ticks[-1], 1)).all()
     worlds.close()
     assert play.ticks == sum(ticks) >= play.lengths.max()
     assert sum(ticks[:60]) == 1000

@@ -38,13 +38,13 @@ def place(tasks, make, seed):
 
 
 def over(tasks, y):
-    x, _, z = tasks.config.world.board.centre
+    x, _, z = tasks.config.board.centre
     return tasks.posture_over(Pose(np.array([x, y, z]), DOWN))
 
 
 @pytest.mark.parametrize("make", [bottle, thrust_meter])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_forearm_reaches_it_on_its_way_right_and_not_before(probe, make, seed):
+def test_the_forearm_reaches_it_going_right_and_not_before(probe, make, seed):
     centre = np.array(place(probe, make, seed))
     radius = make((0, 0, 0)).radius
     gaps = np.array([distance_to_arm(probe, over(probe, y), centre) for y in np.linspace(0.1, -0.2, 31)]) - radius
@@ -71,7 +71,7 @@ def test_forearm_is_the_thickest_capsule_of_link_5(probe):
 @pytest.mark.parametrize("make", [bottle, thrust_meter])
 def test_led_to_the_right_every_seed_meets_it(probe, make):
     episodes = Wiping().towards_obstacle("vices", SEEDS, lambda arm, q: make(place_before_forearm(arm, q, make)))
-    assert (episodes.worlds.reports["obstacle_force_peak"] == 0.0).all()
+    assert (episodes.worlds.metrics["obstacle_force_peak"] == 0.0).all()
 
     def to_the_right(observation):
         action = np.zeros((len(SEEDS), 18))

@@ -14,7 +14,7 @@ def measured():
         patch.setattr(speed, "ROUNDS", 2)
         patch.setattr(speed, "_TICKS", 20)
         patch.setattr(speed, "_ENVS", 2)
-        found = speed.measure_speed(Reaching(), Bundle.load(shipped_bundle()), told.append)
+        found = speed.measure_speed(Reaching(), Bundle.load(shipped_bundle("wiping")), told.append)
     return found, told
 
 

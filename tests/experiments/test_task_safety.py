@@ -11,7 +11,7 @@ from contactsafe.tasks.wiping.scenes import Wiping
 
 
 def config(controllers, trials):
-    return ExperimentConfig(controllers, trials, 0, task=Wiping(), bundle=Bundle.load(shipped_bundle()))
+    return ExperimentConfig(controllers, trials, 0, task=Wiping(), bundle=Bundle.load(shipped_bundle("wiping")))
 
 
 def test_the_film_is_not_of_a_board_that_one_stroke_wipes_but_of_the_fullest():

@@ -7,7 +7,7 @@ import pytest
 
 from contactsafe.robot import robots
 from contactsafe.robot.arm import arm_from_description
-from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tool
+from contactsafe.robot.description import ArmDescription, Capsule, Inertia, Joint, Link, Tip, Tool
 
 
 @pytest.fixture(scope="session")
@@ -60,12 +60,12 @@ def _random_arm(rng, n):
         torque_rate_max=1000.0,
         home=(0.3,) * n,
     )
-    tool = Tool("random", _random_inertia(rng), _tuple(rng.uniform(-0.2, 0.2, 3)), (), (0.03, 0.02, 0.01))
+    tool = Tool("random", _random_inertia(rng), _tuple(rng.uniform(-0.2, 0.2, 3)), (), Tip((0.03, 0.02, 0.01)))
     return arm_from_description(description, tool)
 
 
 def _random_inertia(rng):
-    """Give the inertia of a cloud of points: whatever they are, such a body can exist."""
+    """Return the inertia of a cloud of points: whatever they are, such a body can exist."""
     points = rng.normal(size=(8, 3)) * 0.08
     points -= points.mean(axis=0)
     mass = float(rng.uniform(0.5, 4.0))

@@ -10,7 +10,7 @@ from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
 
 ARMS = pytest.mark.parametrize("description", [PANDA, FR3], ids=lambda description: description.name)
-BODIES = {"hand": HAND.inertia, "pad": WIPER.inertia}
+BODIES = {"hand": HAND.inertia, "wiper": WIPER.inertia}
 for arm in (PANDA, FR3):
     BODIES |= {f"{arm.name} base": arm.base}
     BODIES |= {f"{arm.name} link{index}": link.inertia for index, link in enumerate(arm.links, start=1)}

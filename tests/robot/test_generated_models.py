@@ -83,15 +83,15 @@ def test_capsule_becomes_a_cylinder_between_two_spheres(end):
     assert second.find("origin").get("xyz") == numbers(end)
 
 
-def test_pad_is_the_same_box(panda, urdf):
+def test_tip_is_the_same_box(panda, urdf):
     box = urdf.find("link[@name='tool']/collision/geometry/box")
-    geom = panda.model.geom("pad")
+    geom = panda.model.geom("tip")
     assert geom.type == mujoco.mjtGeom.mjGEOM_BOX
     assert_array_equal(np.array(box.get("size").split(), dtype=float), 2 * geom.size)
 
 
-def test_pad_ends_at_the_tool_point(panda):
-    geom, site = panda.model.geom("pad"), panda.model.site(panda.site)
+def test_tip_ends_at_the_tool_point(panda):
+    geom, site = panda.model.geom("tip"), panda.model.site(panda.site)
     assert_allclose(geom.pos + geom.size * [0, 0, 1], site.pos, rtol=0, atol=1e-15)
 
 

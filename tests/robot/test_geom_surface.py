@@ -42,14 +42,14 @@ SHAPES = {
 
 
 def showing(geoms):
-    """Give a scene whose second link shows some geoms, and its arm."""
+    """Return a scene whose second link shows some geoms, and its arm."""
     corners = " ".join(str(number) for corner in CORNERS for number in corner)
     model = mujoco.MjModel.from_xml_string(SCENE.format(corners=corners, geoms=geoms))
     return model, robots.from_mjcf(model, site="tip")
 
 
 def seen_from_geom(model, arm, geom):
-    """Give points and normals of the second link's surface in a geom's frame, (P, 3) each."""
+    """Return points and normals of the second link's surface in a geom's frame, (P, 3) each."""
     assert_array_equal(arm.surface[:, 0], 2)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -58,7 +58,7 @@ def seen_from_geom(model, arm, geom):
 
 
 def above(shape, p, size):
-    """Give how far points (P, 3) are above a shape's surface, m, in its frame; exact near the surface."""
+    """Return how far points (P, 3) are above a shape's surface, m, in its frame; exact near the surface."""
     radial = np.linalg.norm(p[:, :2], axis=1)
     if shape == "sphere":
         return np.linalg.norm(p, axis=1) - size[0]

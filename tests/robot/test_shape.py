@@ -1,4 +1,4 @@
-"""Capsules and pad lie where MuJoCo puts the geoms of the generated model."""
+"""Capsules and tip lie where MuJoCo puts the geoms of the generated model."""
 
 import mujoco
 import numpy as np
@@ -17,7 +17,7 @@ def postures():
     return np.random.default_rng(0).uniform(low, high, (25, 7))
 
 
-@pytest.mark.parametrize("tool", [WIPER, HAND], ids=["pad", "hand"])
+@pytest.mark.parametrize("tool", [WIPER, HAND], ids=["wiper", "hand"])
 def test_capsules_are_mujocos(postures, tool):
     model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, tool))
     data = mujoco.MjData(model)
@@ -36,16 +36,16 @@ def test_capsules_are_mujocos(postures, tool):
         np.testing.assert_allclose(length, sign * axis, atol=1e-9)
 
 
-def test_pad_is_mujocos(postures):
+def test_tip_is_mujocos(postures):
     model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, WIPER))
     data = mujoco.MjData(model)
     centre, half, rotation = tip_box(PANDA, WIPER, postures)
-    np.testing.assert_allclose(half, model.geom("pad").size)
+    np.testing.assert_allclose(half, model.geom("tip").size)
     for i, q in enumerate(postures):
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
-        np.testing.assert_allclose(centre[i], data.geom("pad").xpos, atol=1e-9)
-        np.testing.assert_allclose(rotation[i], data.geom("pad").xmat.reshape(3, 3), atol=1e-9)
+        np.testing.assert_allclose(centre[i], data.geom("tip").xpos, atol=1e-9)
+        np.testing.assert_allclose(rotation[i], data.geom("tip").xmat.reshape(3, 3), atol=1e-9)
 
 
 def test_wrong_shape_is_refused():
@@ -53,6 +53,6 @@ def test_wrong_shape_is_refused():
         arm_capsules(PANDA, WIPER, np.zeros(7))
 
 
-def test_tool_without_pad_is_refused():
-    with pytest.raises(InvalidInputError, match="tool 'franka hand' has no pad"):
+def test_tool_without_a_box_for_a_tip_is_refused():
+    with pytest.raises(InvalidInputError, match="tool 'franka hand' has no box for a tip"):
         tip_box(PANDA, HAND, np.zeros((1, 7)))

@@ -26,21 +26,21 @@ class Placed:
         mujoco.mj_comPos(arm.model, self.data)
 
     def torque(self, link, point, push):
-        """Give J_pᵀ F of a force at a point of a link, both in the link's frame, (n,)."""
+        """Return J_pᵀ F of a force at a point of a link, both in the link's frame, (n,)."""
         body, J = int(self.arm.model.jnt_bodyid[link - 1]), np.zeros((3, self.arm.n))
         R = self.data.xmat[body].reshape(3, 3)
         mujoco.mj_jac(self.arm.model, self.data, J, None, self.data.xpos[body] + R @ point, body)
         return J.T @ R @ push
 
     def search(self, torque):
-        """Give the link found for a contact torque, and the lever arm there, m."""
+        """Return the link found for a contact torque, and the lever arm there, m."""
         scratch = np.zeros(self.arm.n)
         best, _ = best_point(self.handle, 0, len(self.arm.surface), torque, scratch, -1, 0.0)
         return surface_torque(self.handle, best, scratch), np.linalg.norm(scratch)
 
 
 def random_contact(arm, rng):
-    """Give a link from 4 on, a point of one of its capsules' sides, and the normal there, in the link's frame."""
+    """Return a link from 4 on, a point of one of its capsules' sides, and the normal there, in the link's frame."""
     link = int(rng.integers(4, arm.n + 1))
     capsules = arm.description.links[link - 1].capsules
     capsule = capsules[rng.integers(len(capsules))]

@@ -34,5 +34,11 @@ class NominalBackend:
         self._qd = self._qd + self._tick_s * dynamics["M_inv"] @ (self._torque - dynamics["c"] - dynamics["g"])
         self._q = self._q + self._tick_s * self._qd
 
+    def place_fixture(self, name, position, quat):
+        raise InvalidInputError(f"fixture '{name}' is to be placed; the nominal dynamics meet none")
+
+    def set_tip_friction(self, friction):
+        pass  # the tip meets nothing
+
     def close(self):
         pass

@@ -64,5 +64,12 @@ class PublicMujoco:
     def step(self):
         mujoco.mj_step(self.model, self.data)
 
+    def place_fixture(self, name, position, quat):
+        body = self.model.body(name).id
+        self.model.body_pos[body], self.model.body_quat[body] = position, quat
+
+    def set_tip_friction(self, friction):
+        self.model.geom("tip").friction[0] = friction
+
     def close(self):
         pass

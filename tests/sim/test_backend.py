@@ -29,7 +29,7 @@ DELAYED = WorldConfig(plant=PlantConfig(torque_delay_ticks=1), sensors=NO_NOISE)
 @pytest.mark.parametrize("kind", [NominalBackend, PublicMujoco, BulletBackend])
 def test_backends_have_the_contracts_methods(kind):
     methods = [name for name, _ in inspect.getmembers(Backend, inspect.isfunction) if not name.startswith("_")]
-    assert methods == ["close", "read", "reset", "step", "write"]
+    assert methods == ["close", "place_fixture", "read", "reset", "set_tip_friction", "step", "write"]
     for name in methods:
         assert hasattr(kind, name) or name == "close"  # PyBullet's is made with its client
 

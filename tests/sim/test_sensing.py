@@ -144,7 +144,7 @@ def test_once_sensed_the_plant_may_change_unseen():
 
 
 def readings(worlds, ticks):
-    """Run tick by tick; give measured positions, measured velocities and the plant's before each tick."""
+    """Run tick by tick; return measured positions, measured velocities and the plant's before each tick."""
     q, qd, true_q, true_qd = [], [], [], []
     for _ in range(ticks):
         true_q.append(worlds.datas[0].qpos[:7].copy())
@@ -261,7 +261,7 @@ def test_a_lighter_tool_weighs_less_and_shows_so_at_the_wrist():
         ({"inertia_scale": (1.0, 1.1)}, "inertia_scale has 2 numbers; give one, or one for each of 7 joints"),
         (
             {"payload_kg": -0.83},
-            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiping pad'; give a larger one",
+            "payload_kg = -0.83 takes more than the 0.83 kg of tool 'franka hand with wiper'; give a larger one",
         ),
     ],
 )

@@ -10,7 +10,7 @@ REAL = WorldConfig(sensors=REAL_SENSORS)
 
 
 def taken_over(worlds, ticks=600):
-    """Reset the controller where its arm is measured and run on; give the trace before and after."""
+    """Reset the controller where its arm is measured and run on; return the trace before and after."""
     before = run(worlds, 300)[0]
     measured = worlds.controllers["measurement"][0]
     worlds._owners[0].reset(measured["q"].copy(), measured["qd"].copy())

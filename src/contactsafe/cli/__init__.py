@@ -13,6 +13,7 @@ from contactsafe.cli.training import train
 from contactsafe.core import process
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.core.parse import call, docstring
+from contactsafe.tasks import import_task
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _main(arguments)
 
 
+def _with_tasks_imported(words: Sequence[str]) -> list[str]:
+    """Import the tasks that words name as `--task module:name`; return the words with the names alone."""
+    known = list(words)
+    for k, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if option != "--task":
+            continue
+        if equals and ":" in value:
+            known[k] = f"--task={import_task(value)}"
+        elif not equals and ":" in "".join(words[k + 1 : k + 2]):
+            known[k + 1] = import_task(words[k + 1])
+    return known
+
+
 def _main(words: Sequence[str]) -> int:
     first_run()
     if not words or words[0] in ("-h", "--help"):
@@ -68,6 +83,7 @@ def _main(words: Sequence[str]) -> int:
         return 2
     command = COMMANDS[words[0]]
     try:
+        words = _with_tasks_imported(words)
         if command.parses:
             command.run(words[1:])
         else:

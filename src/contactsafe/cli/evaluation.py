@@ -42,7 +42,7 @@ class Options:
     seed: int = 0
     json: bool = False
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         """Refuse numbers that cannot be."""
         if self.episodes < 1:
             raise InvalidInputError(f"episodes = {self.episodes}; give 1 or more")
@@ -54,10 +54,11 @@ def evaluate(arguments: Sequence[str]) -> None:
     """Let a policy do its task in episodes it has never seen.
 
     Reports success, forces and times. For one seed and number of episodes all policies and controllers meet the same.
-    The options from --engine on are those of the task.
+    The options from --controller on are those of the task.
     """
     described = task_by_name(task_of(arguments))
     asked = parse(_options_of(described), "contactsafe evaluate", arguments, description=docstring(evaluate))
+    asked.check()
     if asked.scripted is not None and asked.bundle is not None:
         raise InvalidInputError(f"a bundle and --scripted {asked.scripted} are both given; name one")
     bundle = None if asked.scripted else load_bundle(asked.bundle, described.name)
@@ -94,7 +95,7 @@ def _options_of(task: Task) -> type:
 def _own_options(task: Task) -> list[str]:
     """Return the names of the options that describe the task, all but the controller, which stands alone."""
     own = [field.name for field in dataclasses.fields(task.options) if field.name != "controller"]
-    return [*own[:2], "engine", *own[2:]]
+    return [*own, "engine"]
 
 
 def _conditions(config: TaskConfig, bundle: Bundle | None) -> dict[str, Any]:

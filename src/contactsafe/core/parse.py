@@ -10,7 +10,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 import tyro
@@ -37,13 +37,13 @@ _PLAINER: dict[str, str | Callable[[re.Match], str]] = {
 """What tyro says, and how it is said here."""
 
 
-def one_of(names: Iterable[str]) -> PrimitiveConstructorSpec:
+def one_of(names: Collection[str]) -> PrimitiveConstructorSpec:
     """Say in `Annotated` of a text that it is one of some names: help lists them, and no other passes.
 
     Args:
-        names: all there are, from where they are defined.
+        names: all there are, from where they are defined; those that are added later pass too.
     """
-    known = tuple(names)
+    known = names
     return PrimitiveConstructorSpec(
         nargs=1,
         metavar=f"{{{','.join(known)}}}",
@@ -72,7 +72,7 @@ def some_of(names: Iterable[str], separator: str = ",") -> PrimitiveConstructorS
     )
 
 
-def _known(name: str, known: Sequence[str]) -> str:
+def _known(name: str, known: Collection[str]) -> str:
     if name not in known:
         raise ValueError(f"'{name}' is unknown; choose from {', '.join(known)}")
     return name

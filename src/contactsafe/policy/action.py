@@ -22,7 +22,7 @@ def rotation_from_down(quat):
 def apply_action(c, limits, rule, action):
     """Move the target of a `controller_dtype` record by one action.
 
-    x_d is never farther from the tool than `offset_max` along x and y, nor outside its bounds; the posture is the one
+    x_d is never farther from the tool than `offset_max`, nor outside its bounds; the posture is the one
     that goes with x_d, whatever path led there, and stays where it was when there is none.
 
     Args:
@@ -43,9 +43,9 @@ def apply_action(c, limits, rule, action):
         D = target.D_task[i] + min(max(action[12 + i], -1.0), 1.0) * limits.step[12 + i]
         target.K_task[i] = min(max(K, limits.K_low[i]), limits.K_high[i])
         target.D_task[i] = min(max(D, limits.D_low[i]), limits.D_high[i])
-    for i in range(2):
-        tool = c.output.position[i]
-        target.position[i] = min(max(target.position[i], tool - limits.offset_max[0]), tool + limits.offset_max[0])
+    for i in range(3):
+        tool, offset_max = c.output.position[i], limits.offset_max[i]
+        target.position[i] = min(max(target.position[i], tool - offset_max), tool + offset_max)
     target.quat[:] = quat_multiply(rotvec_to_quat(rotvec), DOWN)
     q_posture = np.empty(target.q_posture.shape[0])
     error, rotation_error = find_posture(rule, target.position, target.quat, q_posture)

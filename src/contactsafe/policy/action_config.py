@@ -1,5 +1,6 @@
 """How far one action moves a target, and the bounds that it keeps."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -40,6 +41,8 @@ class ActionConfig:
             Billard 2016 (775 1/s³).
         damping: largest step of D1, 1/s.
         offset_max: largest distance of x_d from the tool along x and y, m.
+        offset_max_z: the same along z, m: what the spring stores against a surface comes free where that ends; inf for
+            no bound.
         press: lowest x_d below the centre of the workspace, m.
         height: highest x_d above it, m.
         reach: half edge of the square around it that x_d stays in, m.
@@ -55,6 +58,7 @@ class ActionConfig:
     stiffness: Six = (10.0, 10.0, 10.0, 20.0, 20.0, 20.0)
     damping: Six = (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
     offset_max: float = 0.05
+    offset_max_z: float = math.inf
     press: float = 0.012
     height: float = 0.12
     reach: float = 0.27
@@ -91,7 +95,7 @@ class ActionLimits(NamedTuple):
         step: largest change of pose, K1, D1, (18,).
         low, high: bounds of x_d along x, y, z, m, and of the rotation vector from straight down, rad, (6,).
         K_low, K_high, D_low, D_high: (6,).
-        offset_max: (1,), m.
+        offset_max: along x, y, z, (3,), m.
     """
 
     step: np.ndarray
@@ -120,5 +124,5 @@ def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> A
         K_high=K_high,
         D_low=D_low,
         D_high=D_high,
-        offset_max=np.array([config.offset_max]),
+        offset_max=np.array([config.offset_max, config.offset_max, config.offset_max_z]),
     )

@@ -15,21 +15,21 @@ PUSHES = Pushes(force_n=(20.0, 25.0), lasting_s=(0.2, 0.4), pause_s=(0.1, 0.2), 
 
 
 def pushed(steps=120, seed=3):
-    """Hold still for a while; give what was planned at each step, and how far the tool went, m."""
+    """Hold still for a while; return what was planned at each step, and how far the tool went, m."""
     tasks = WipingTasks(WipingConfig(controller="vices", pushes=PUSHES), 1, seed=0)
     tasks.reset(0, np.random.default_rng(seed), drawing=np.ones((2, 2)), start=(0.5, 0.0, 0.1))
-    start, planned, way = tasks.tasks["pose"][0, :3].copy(), [], 0.0
+    start, planned, displacement = tasks.tasks["pose"][0, :3].copy(), [], 0.0
     for _ in range(steps):
-        plant = tasks.worlds.plants[0]
-        plan = [int(plant[name]) for name in ("push_body", "push_start", "push_stop")]
-        planned.append((*plan, *plant["push_force"]))
+        push = tasks.worlds.records[0]["push"]
+        plan = [int(push[name]) for name in ("body", "start", "stop")]
+        planned.append((*plan, *push["force"]))
         tasks.step(np.zeros((1, 18)))
-        way = max(way, float(np.linalg.norm(tasks.tasks["pose"][0, :3] - start)))
-    return sorted(set(planned), key=lambda push: push[1]), way
+        displacement = max(displacement, float(np.linalg.norm(tasks.tasks["pose"][0, :3] - start)))
+    return sorted(set(planned), key=lambda push: push[1]), displacement
 
 
 def test_pushes_follow_one_another_within_their_ranges_and_move_the_arm():
-    plans, way = pushed()
+    plans, displacement = pushed()
     assert len(plans) >= 3
     for (_, _, stop, *_), (_, start, *_) in itertools.pairwise(plans):
         assert start > stop
@@ -37,7 +37,7 @@ def test_pushes_follow_one_another_within_their_ranges_and_move_the_arm():
         assert 195 <= stop - start <= 405
         assert 20.0 <= np.linalg.norm(force) <= 25.0
     assert len({body for body, *_ in plans}) <= 2
-    assert way > 0.003
+    assert displacement > 0.003
 
 
 def test_same_seed_same_pushes():

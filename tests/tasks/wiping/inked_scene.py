@@ -5,6 +5,7 @@ miss slivers of ink that reach less far into it. The ink's geometry is grown by 
 counts as ink where ink reaches into it; without that, thin strokes score 0.93.
 """
 
+import math
 import xml.etree.ElementTree as ET
 
 import mujoco
@@ -22,10 +23,10 @@ _THICK = 1e-5  # m
 class Renderings:
     """Masks of one board by MuJoCo, at eight times the resolution; use as a context."""
 
-    def __init__(self, config, board):
-        self._model = mujoco.MjModel.from_xml_string(_with_ink(scene_mjcf(panda(), config), board, config.camera))
+    def __init__(self, config, board, camera):
+        self._model = mujoco.MjModel.from_xml_string(_with_ink(scene_mjcf(panda(), config), board, camera))
         self._data = mujoco.MjData(self._model)
-        self._size = config.camera.size
+        self._size = camera.size
 
     def __enter__(self):
         self._renderer = mujoco.Renderer(self._model, self._size * _TIMES, self._size * _TIMES)
@@ -51,7 +52,7 @@ class Renderings:
 
 
 def _half_sub_pixel(camera):
-    """Give its footprint on the board along x (foreshortened) and y, m; the camera looks along x."""
+    """Compute its footprint on the board along x (foreshortened) and y, m; the camera looks along x."""
     away = np.subtract(camera.position, camera.target)
     half = np.linalg.norm(away) / camera.focal_px / (2 * _TIMES)
     return half * np.linalg.norm(away) / away[2], half
@@ -60,6 +61,7 @@ def _half_sub_pixel(camera):
 def _with_ink(xml, board, camera):
     root = ET.fromstring(xml)
     world = root.find("worldbody")
+    _add_camera(world, camera)
     cell, z = board.config.cell, board.config.centre[2]
     grow_x, grow_y = _half_sub_pixel(camera)
     for k, (row, first, stop) in enumerate(_runs(board.cells == INK)):
@@ -69,6 +71,15 @@ def _with_ink(xml, board, camera):
             size=numbers((cell / 2 + grow_x, (stop - first) * cell / 2 + grow_y, _THICK)), contype="0", conaffinity="0",
         )  # fmt: skip
     return ET.tostring(root, encoding="unicode")
+
+
+def _add_camera(world, camera):
+    ET.SubElement(world, "body", name="camera_target", pos=numbers(camera.target))
+    fovy = math.degrees(2 * math.atan(camera.size / 2 / camera.focal_px))
+    ET.SubElement(
+        world, "camera", name="board_camera", mode="targetbody", target="camera_target",
+        pos=numbers(camera.position), fovy=numbers([fovy]),
+    )  # fmt: skip
 
 
 def _runs(ink):

@@ -46,20 +46,20 @@ def wipe_nearest(tasks, step, depth=0.004):
     """Press, and head for the nearest ink, over its far edge."""
     action = press(tasks, step, depth)
     for i in range(tasks.worlds.n):
-        ink = np.argwhere(tasks.worlds.cells[i] == INK)
+        ink = np.argwhere(tasks.boards.cells[i] == INK)
         if len(ink) == 0:
             continue
         record = tasks.worlds.controllers[i]
-        places = tasks.worlds.boards[i].origin + (ink + 0.5) * 0.002
+        places = tasks.boards.boards[i].origin + (ink + 0.5) * 0.002
         away = places - record["output"]["position"][:2]
         goal = places[np.argmin(np.linalg.norm(away, axis=1))]
         error = goal - record["output"]["position"][:2]
-        lead = record["output"]["position"][:2] + error * (1.0 + 0.04 / max(np.linalg.norm(error), 1e-3))
-        action[i, :2] = (lead - record["target"]["position"][:2]) / tasks.config.action.translation[0]
+        beyond = record["output"]["position"][:2] + error * (1.0 + 0.04 / max(np.linalg.norm(error), 1e-3))
+        action[i, :2] = (beyond - record["target"]["position"][:2]) / tasks.config.action.translation[0]
     return np.clip(action, -1.0, 1.0)
 
 
 def _down(tasks, depth):
     z = tasks.worlds.controllers["target"]["position"][:, 2]
-    goal = tasks.config.world.board.centre[2] - depth
+    goal = tasks.config.board.centre[2] - depth
     return np.clip((goal - z) / tasks.config.action.translation[2], -1.0, 1.0)

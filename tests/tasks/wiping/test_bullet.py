@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.policy.policy import Policy
-from contactsafe.tasks import ENGINES, make_engine
+from contactsafe.tasks import ENGINES, make_vec
 from contactsafe.tasks.base.evaluation import evaluate_policy
 from contactsafe.tasks.wiping.config import WipingConfig
 
@@ -21,7 +21,7 @@ SHORT = WipingConfig(episode_s=0.3)
 
 @pytest.fixture
 def both():
-    engines = [make_engine(name, 2, SHORT) for name in ENGINES]
+    engines = [make_vec("wiping", 2, SHORT, name) for name in ENGINES]
     yield engines
     for engine in engines:
         engine.close()
@@ -57,7 +57,7 @@ def test_the_same_actions_move_the_tool_alike(both):
 
 
 def test_a_bundle_runs_unchanged():
-    engine = make_engine("pybullet", 1, SHORT)
+    engine = make_vec("wiping", 1, engine="pybullet", config=SHORT)
     results = evaluate_policy(Policy(shipped_bundle("wiping"), engine.unwrapped.camera_homography), engine, 2, seed=0)
     assert results["episodes"] == 2
     assert [record["time_s"] for record in results["records"]] == [0.3, 0.3]
@@ -65,7 +65,7 @@ def test_a_bundle_runs_unchanged():
 
 
 def test_single_environment():
-    env = gymnasium.make("contactsafe/WipingBullet-v0", config=SHORT)
+    env = gymnasium.make("contactsafe/Wiping-v0", config=SHORT, engine="pybullet")
     observation, _ = env.reset(seed=0)
     after, reward, terminated, truncated, info = env.step(np.zeros(18, np.float32))
     assert after in env.observation_space
@@ -79,7 +79,7 @@ def test_single_environment():
 
 @pytest.mark.slow
 def test_the_shipped_policy_wipes_in_the_second_engine():
-    engine = make_engine("pybullet", 1, WipingConfig())
+    engine = make_vec("wiping", 1, engine="pybullet", config=WipingConfig())
     results = evaluate_policy(
         Policy(shipped_bundle("wiping"), engine.unwrapped.camera_homography), engine, 3, seed=1_000_003
     )
@@ -90,5 +90,5 @@ def test_the_shipped_policy_wipes_in_the_second_engine():
 
 def test_an_unknown_engine_is_told():
     with pytest.raises(InvalidInputError) as caught:
-        make_engine("gazebo", 1)
+        make_vec("wiping", 1, engine="gazebo")
     assert str(caught.value) == "engine = 'gazebo'; choose mujoco or pybullet"

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.sim.scenes import BOARD_Z, CALM, DOWN, panda, posture
+from tests.sim.scenes import BOARD_Z, DOWN, posture
+from tests.tasks.wiping.boards_in_worlds import BOARD
+from tests.tasks.wiping.boards_in_worlds import scene as make_scene
 
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.worlds import Worlds
-from contactsafe.tasks.wiping.board import Camera
+from contactsafe.tasks.wiping.board import Camera, furnish
 from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
 from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
 
@@ -19,14 +20,14 @@ AWAY = (0.35, 0.0, 0.5)
 
 
 @pytest.fixture(scope="module")
-def worlds():
-    return Worlds(panda(), CALM)
+def scene():
+    return make_scene()
 
 
 def pinhole(camera, point):
     """Project by hand: z forward along the line of sight, x right and level, y down; the middle is (size / 2)²."""
-    sight = np.subtract(camera.target, camera.position)
-    z = sight / math.sqrt(sight @ sight)
+    line = np.subtract(camera.target, camera.position)
+    z = line / math.sqrt(line @ line)
     x = np.array([z[1], -z[0], 0.0]) / math.hypot(z[0], z[1])
     y = np.cross(z, x)
     away = np.subtract(point, camera.position)
@@ -68,14 +69,14 @@ def test_camera_axes_are_a_right_handed_frame():
     assert_allclose(np.linalg.det(R), 1.0)
 
 
-def test_a_cell_of_ink_marks_the_pixel_it_is_seen_in(worlds):
-    worlds.place(0, posture(AWAY))
-    board = worlds.boards[0]
+def test_a_cell_of_ink_marks_the_pixel_it_is_seen_in(scene):
+    scene.place(posture(AWAY))
+    board = scene.board
     for i, j in ((90, 100), (125, 150), (170, 220)):
         board.clear()
         board.cells[i, j] = INK
         u, v = by_homography(CAMERA, *(board.origin + (np.array([i, j]) + 0.5) * 0.002))
-        mask = worlds.render()[0]
+        mask = scene.mask()
         assert mask[int(v), int(u)] == 0
         assert np.count_nonzero(mask == 0) <= 4  # a cell is smaller than a pixel
         rows, columns = np.nonzero(mask == 0)
@@ -83,33 +84,33 @@ def test_a_cell_of_ink_marks_the_pixel_it_is_seen_in(worlds):
         assert np.abs(columns + 0.5 - u).max() < 1.5
 
 
-def test_a_mask_holds_0_and_255_only_and_a_clean_board_is_blank(worlds):
-    board = worlds.boards[0]
+def test_a_mask_holds_0_and_255_only_and_a_clean_board_is_blank(scene):
+    board = scene.board
     board.clear()
-    worlds.place(0, posture((0.5, 0.0, BOARD_Z + 0.02)))
-    assert (worlds.render()[0] == 255).all()
+    scene.place(posture((0.5, 0.0, BOARD_Z + 0.02)))
+    assert (scene.mask() == 255).all()
     board.sample_random(np.random.default_rng(0))
-    assert set(np.unique(worlds.render()[0])) == {0, 255}
+    assert set(np.unique(scene.mask())) == {0, 255}
 
 
-def test_a_dark_object_looks_like_ink(worlds):
-    board = worlds.boards[0]
-    worlds.place(0, posture(AWAY))
+def test_a_dark_object_looks_like_ink(scene):
+    board = scene.board
+    scene.place(posture(AWAY))
     board.clear()
     board.place_object((0.5, 0.05), (0.06, 0.06))
     u, v = by_homography(CAMERA, 0.5, 0.05)
-    assert worlds.render()[0][int(v), int(u)] == 0
+    assert scene.mask()[int(v), int(u)] == 0
 
 
-def test_the_arm_hides_ink(worlds):
-    """All ink behind the pad and the hand is gone from sight; all the rest stays."""
-    board = worlds.boards[0]
+def test_the_arm_hides_ink(scene):
+    """All ink behind the pad and the hand is out of view; all the rest stays."""
+    board = scene.board
     board.clear()
     board.draw(np.ones((1, 1)))
-    worlds.place(0, posture(AWAY))
-    free = worlds.render()[0].copy() == 0
-    worlds.place(0, posture((0.5, 0.0, BOARD_Z)))
-    seen = worlds.render()[0] == 0
+    scene.place(posture(AWAY))
+    free = scene.mask().copy() == 0
+    scene.place(posture((0.5, 0.0, BOARD_Z)))
+    seen = scene.mask() == 0
     assert not (seen & ~free).any()
     u, v = by_homography(CAMERA, 0.5, 0.0)
     assert not seen[int(v), int(u)]
@@ -142,32 +143,32 @@ POSES = {
 
 @pytest.mark.render
 @pytest.mark.parametrize("drawing", BOARDS)
-def test_the_mask_is_mujocos_own_segmentation_of_the_same_scene(worlds, drawing):
-    from tests.sim.inked_scene import Renderings
+def test_the_mask_is_mujocos_own_segmentation_of_the_same_scene(scene, drawing):
+    from tests.tasks.wiping.inked_scene import Renderings
 
-    worlds.boards[0].clear()
-    BOARDS[drawing](worlds.boards[0])
-    shares = {}
-    with Renderings(WorldConfig(), worlds.boards[0]) as renderings:
+    scene.board.clear()
+    BOARDS[drawing](scene.board)
+    overlaps = {}
+    with Renderings(furnish(WorldConfig(), BOARD), scene.board, CAMERA) as renderings:
         for pose, (position, tilt) in POSES.items():
             q = posture(position, quat_multiply(rotvec_to_quat(np.array(tilt)), DOWN))
-            worlds.place(0, q)
-            ours, theirs = worlds.render()[0] == 0, renderings.mask(q)
-            shares[pose] = (ours & theirs).sum() / (ours | theirs).sum()
-    assert min(shares.values()) >= 0.95, shares
+            scene.place(q)
+            ours, theirs = scene.mask() == 0, renderings.mask(q)
+            overlaps[pose] = (ours & theirs).sum() / (ours | theirs).sum()
+    assert min(overlaps.values()) >= 0.95, overlaps
 
 
 @pytest.mark.render
-def test_specks_of_ink_are_not_lost_nor_invented(worlds):
+def test_specks_of_ink_are_not_lost_nor_invented(scene):
     """Squares of 6 mm, little more than a pixel: each is where MuJoCo shows one, give or take a pixel."""
-    from tests.sim.inked_scene import Renderings
+    from tests.tasks.wiping.inked_scene import Renderings
 
-    worlds.boards[0].clear()
-    worlds.boards[0].draw(np.random.default_rng(2).uniform(size=(50, 50)) < 0.02)
+    scene.board.clear()
+    scene.board.draw(np.random.default_rng(2).uniform(size=(50, 50)) < 0.02)
     q = posture(AWAY)
-    worlds.place(0, q)
-    with Renderings(WorldConfig(), worlds.boards[0]) as renderings:
-        ours, theirs = worlds.render()[0] == 0, renderings.mask(q)
+    scene.place(q)
+    with Renderings(furnish(WorldConfig(), BOARD), scene.board, CAMERA) as renderings:
+        ours, theirs = scene.mask() == 0, renderings.mask(q)
     assert theirs.sum() > 100
     assert not (ours & ~grown(theirs)).any()
     assert not (theirs & ~grown(ours)).any()

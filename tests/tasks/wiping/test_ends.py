@@ -14,7 +14,7 @@ SPOT[13:16, 13:16] = 1
 
 def test_a_clean_board_ends_the_episode_as_a_success():
     _, tasks, terms = episode(TASK, wipe_nearest, n=1, drawing=SPOT)
-    assert tasks.tasks["clean"][0] == 1
+    assert tasks.tasks["success"][0] == 1
     assert tasks.terminated[0]
     assert not tasks.truncated[0]
     assert tasks.info()["is_success"][0]
@@ -55,13 +55,13 @@ def test_the_arm_on_the_table_is_punished_once_and_ends_the_episode():
 def test_the_pad_on_the_board_is_not_the_arm_on_the_table(depth):
     _, tasks, terms = episode(TASK, lambda t, s: wipe_nearest(t, s, depth), n=2, steps=120)
     assert (terms[:, :, 3] > 0).any()
-    assert not tasks.tasks["arm_touched"].any()
+    assert not tasks.tasks["failed"].any()
 
 
-def test_a_speck_below_the_share_counts_as_clean():
+def test_a_speck_below_the_fraction_counts_as_clean():
     tasks = WipingTasks(TASK)
     tasks.reset(0, np.random.default_rng(0), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.08))
-    cells = tasks.worlds.cells[0]
+    cells = tasks.boards.cells[0]
     rows, columns = np.nonzero(cells)
     keep = int(TASK.clean_fraction * len(rows))
     cells[rows[keep + 1 :], columns[keep + 1 :]] = 0

@@ -36,13 +36,13 @@ def test_boards_are_of_the_kind_asked_for_and_the_seeds():
 def test_a_drawing_of_ones_own_wins():
     env = gymnasium.make(NAME, config=WipingConfig(boards="digits"))
     env.reset(seed=0, options={"drawing": np.ones((1, 1))})
-    assert env.unwrapped.tasks.worlds.ink_cells()[0] == 150**2
+    assert env.unwrapped.tasks.boards.ink_cells()[0] == 150**2
 
 
-def test_the_sight_changes_no_board_and_no_start():
-    plain, seen = (gymnasium.make(NAME, config=WipingConfig(image_source=sight)) for sight in ("mask", "photograph"))
+def test_the_image_source_changes_no_board_and_no_start():
+    plain, seen = (gymnasium.make(NAME, config=WipingConfig(image_source=of)) for of in ("mask", "photograph"))
     (a, _), (b, _) = plain.reset(seed=5), seen.reset(seed=5)
-    assert_array_equal(plain.unwrapped.tasks.worlds.cells, seen.unwrapped.tasks.worlds.cells)
+    assert_array_equal(plain.unwrapped.tasks.boards.cells, seen.unwrapped.tasks.boards.cells)
     assert_array_equal(a["pose"], b["pose"])
     assert agreement(a["mask"], b["mask"]) > 0.6
     assert plain.unwrapped.tasks.tasks["light"][0] == 0
@@ -54,9 +54,9 @@ def test_masks_through_photographs_are_masks_and_follow_the_arm():
     masks = [observation["mask"]]
     for _ in range(20):
         masks.append(env.step(np.r_[1.0, np.zeros(17)].astype(np.float32))[0]["mask"])
-        worlds = env.unwrapped.tasks.worlds
+        tasks = env.unwrapped.tasks
         assert set(np.unique(masks[-1])) <= {0, 255}
-    assert agreement(masks[-1][..., 0], worlds.render()[0]) > 0.6
+    assert agreement(masks[-1][..., 0], tasks.boards.render(tasks.worlds.records)[0]) > 0.6
     assert not np.array_equal(masks[0], masks[-1])
 
 
@@ -64,11 +64,11 @@ def test_where_the_arm_hides_the_board_is_known_by_its_encoders():
     """Encoders that are off move the silhouette that is masked out, while the photograph stays what it was."""
     tasks = WipingTasks(PHOTOGRAPHED)
     tasks.reset(0, np.random.default_rng(1), drawing=np.ones((1, 1)), start=(0.5, 0.0, 0.05))
-    before, picture = tasks.worlds.masks[0].copy(), tasks._images.photograph(0, tasks.tasks[0])
-    tasks.worlds.plants[0]["q_seen"][0] += 0.2
+    before, picture = tasks.boards.masks[0].copy(), tasks._photographs.photograph(0, tasks.tasks[0])
+    tasks.worlds.records[0]["errors"]["q_seen"][0] += 0.2
     tasks.observe(0)
-    assert not np.array_equal(tasks.worlds.masks[0], before)
-    assert_array_equal(tasks._images.photograph(0, tasks.tasks[0]), picture)
+    assert not np.array_equal(tasks.boards.masks[0], before)
+    assert_array_equal(tasks._photographs.photograph(0, tasks.tasks[0]), picture)
 
 
 def test_many_environments_see_what_each_would_see_alone():
@@ -88,17 +88,17 @@ def test_light_and_noise_follow_from_the_tasks_record_alone():
     tasks, others = WipingTasks(PHOTOGRAPHED), WipingTasks(PHOTOGRAPHED)
     for one, seed in ((tasks, 1), (others, 2)):
         one.reset(0, np.random.default_rng(seed), drawing=np.eye(5), start=(0.5, 0.1, 0.05))
-    assert not np.array_equal(tasks.worlds.masks, others.worlds.masks)
+    assert not np.array_equal(tasks.boards.masks, others.boards.masks)
     others.tasks["light"] = tasks.tasks["light"]
     others.observe(0)
-    assert_array_equal(tasks.worlds.masks, others.worlds.masks)
+    assert_array_equal(tasks.boards.masks, others.boards.masks)
 
 
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
         ({"boards": "crayon"}, "boards = 'crayon'; choose strokes, digits, text or handwriting"),
-        ({"image_source": "x-ray"}, "sight = 'x-ray'; choose mask or photograph"),
+        ({"image_source": "x-ray"}, "image_source = 'x-ray'; choose mask or photograph"),
     ],
 )
 def test_other_kinds_are_refused(fields, text):

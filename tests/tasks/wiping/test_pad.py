@@ -1,4 +1,4 @@
-"""The felt pad: how stiff it is under a press, as scene.py states it."""
+"""The felt pad: how stiff it is under a press, as `TipSurface` states it."""
 
 import numpy as np
 import pytest

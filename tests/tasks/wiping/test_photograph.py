@@ -8,9 +8,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.sim.scenes import CALM, panda, posture
+from tests.sim.scenes import posture
+from tests.tasks.wiping.boards_in_worlds import BOARD, CAMERA, scene
 
-from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.drawings import BOARDS, paint_board
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer, sample_conditions
 from contactsafe.tasks.wiping.whiteboard import INK
@@ -23,13 +23,13 @@ class Studio:
     """One world, its photographer, and the segmentation of its photographs."""
 
     def __init__(self):
-        self.worlds = Worlds(panda(), CALM)
-        self.board = self.worlds.boards[0]
-        self.photographer = Photographer(CALM.camera, CALM.board, self.worlds.models[0])
+        self.scene = scene()
+        self.worlds, self.boards, self.board = self.scene.worlds, self.scene.boards, self.scene.board
+        self.photographer = Photographer(CAMERA, BOARD, self.worlds.models[0])
         self.segmenter = Segmenter(self.photographer.homography, self.photographer.corners)
 
     def place(self, position):
-        self.worlds.place(0, posture(position))
+        self.scene.place(posture(position))
 
     @property
     def solids(self):
@@ -42,7 +42,7 @@ class Studio:
     def masks(self, seed, severity):
         """What segmentation finds, and what is there: true where ink is, (128, 128)."""
         found = self.segmenter.segment(self.photograph(seed, severity), self.photographer.hidden(self.solids))
-        return found == 0, self.worlds.render()[0] == 0
+        return found == 0, self.scene.mask() == 0
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_the_last_specks_are_found(studio, severity):
             studio.board.cells[i : i + 2, j : j + 2] = INK
         ink = studio.masks(seed, severity)[0]
         for corner in corners:
-            u, v, w = studio.worlds.homography @ [*(studio.board.origin + (corner + 1) * CALM.board.cell), 1.0]
+            u, v, w = studio.boards.homography @ [*(studio.board.origin + (corner + 1) * BOARD.cell), 1.0]
             u, v = int(u / w), int(v / w)
             found, specks = found + ink[v - 1 : v + 2, u - 1 : u + 2].any(), specks + 1
     assert found / specks >= 0.95
@@ -115,10 +115,10 @@ def test_what_kinematics_hide_is_what_the_mask_hides(studio):
     """The outline's pixels against those whose ink the mask's line-of-sight test removes."""
     studio.board.draw(np.ones((1, 1)))
     studio.place(AWAY)
-    free = studio.worlds.render()[0] == 0
+    free = studio.scene.mask() == 0
     for position in ((0.5, 0.0, 0.01), (0.42, 0.12, 0.04), (0.63, -0.1, 0.09)):
         studio.place(position)
-        hidden = free & (studio.worlds.render()[0] != 0)
+        hidden = free & (studio.scene.mask() != 0)
         middles = ((np.arange(128) + 0.5) * PHOTO_PX / 128).astype(int)
         ours = free & (studio.photographer.hidden(studio.solids)[np.ix_(middles, middles)] > 0)
         assert (ours & hidden).sum() / (ours | hidden).sum() > 0.98
@@ -126,7 +126,7 @@ def test_what_kinematics_hide_is_what_the_mask_hides(studio):
 
 def test_the_homography_is_the_masks_scaled(studio):
     scale = np.diag([PHOTO_PX / 128, PHOTO_PX / 128, 1.0])
-    mine, masks = studio.photographer.homography, scale @ studio.worlds.homography
+    mine, masks = studio.photographer.homography, scale @ studio.boards.homography
     assert_allclose(mine / mine[2, 2], masks / masks[2, 2], atol=1e-9)
 
 

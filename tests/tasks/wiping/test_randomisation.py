@@ -22,7 +22,7 @@ def varied(n=1, **ranges):
 
 
 def pressed(tasks, steps=60):
-    """Lower the pad for a second and give where it came to rest, m, and the force, N."""
+    """Lower the pad for a second and return where it came to rest, m, and the force, N."""
     down = np.zeros((tasks.worlds.n, 18))
     down[:, 2] = -1.0
     for _ in range(steps):
@@ -62,22 +62,22 @@ def test_friction_pad_and_payload_are_the_plants_and_gone_with_the_episode():
     model, nominal = tasks.worlds.models[0], WipingTasks(WipingConfig(), 1, seed=0).worlds.models[0]
     for _ in range(2):
         tasks.reset(0, np.random.default_rng(0))
-        assert model.geom("pad").friction[0] == pytest.approx(2.0 * nominal.geom("pad").friction[0])
-        assert_allclose(model.geom("pad").size[:2], 0.5 * nominal.geom("pad").size[:2])
-        assert_allclose(tasks.worlds.plants[0]["pad_half"], 0.5 * nominal.geom("pad").size[:2])
+        assert model.geom("tip").friction[0] == pytest.approx(2.0 * nominal.geom("tip").friction[0])
+        assert_allclose(model.geom("tip").size[:2], 0.5 * nominal.geom("tip").size[:2])
+        assert_allclose(tasks.boards.records[0]["pad_half"], 0.5 * nominal.geom("tip").size[:2])
         assert model.body("tool").mass[0] == pytest.approx(nominal.body("tool").mass[0] + 0.3)
-        assert not tasks.worlds.plants[0]["friction"][:, 0].any()
+        assert not tasks.worlds.records[0]["errors"]["friction"][:, 0].any()
 
 
 def test_a_late_picture_is_the_one_of_so_many_steps_ago():
     tasks = varied(delay_steps=(2, 2))
-    board, shown = tasks.worlds.boards[0], []
+    board, shown = tasks.boards.boards[0], []
     board.clear()
     tasks.observe(0)
     board.draw(np.ones((3, 3)))
     for _ in range(4):
         tasks.step(np.zeros((1, 18)))
-        shown.append(bool((tasks.worlds.masks[0] == 0).any()))
+        shown.append(bool((tasks.boards.masks[0] == 0).any()))
     assert shown == [False, False, True, True]
 
 
@@ -85,26 +85,26 @@ def test_ink_is_missed_and_invented_as_often_as_was_drawn():
     tasks, clean = varied(ink_missed=(0.3, 0.3)), varied()
     for one in (tasks, clean):
         one.reset(0, np.random.default_rng(0), drawing=np.ones((3, 3)), start=(0.5, 0.0, 0.1))
-    seen, there = [], (clean.worlds.masks[0] == 0).sum()
+    seen, there = [], (clean.boards.masks[0] == 0).sum()
     for _ in range(30):
         tasks.step(np.zeros((1, 18)))
-        seen.append((tasks.worlds.masks[0] == 0).sum() / there)
+        seen.append((tasks.boards.masks[0] == 0).sum() / there)
     assert np.mean(seen) == pytest.approx(0.7, abs=0.03)
     tasks = varied(ink_invented=(2.5, 2.5))
-    tasks.worlds.boards[0].clear()
+    tasks.boards.boards[0].clear()
     counts = []
     for _ in range(200):
         tasks.step(np.zeros((1, 18)))
-        counts.append((tasks.worlds.masks[0] == 0).sum())
+        counts.append((tasks.boards.masks[0] == 0).sum())
     assert np.mean(counts) == pytest.approx(2.5, abs=0.2)
 
 
-def test_a_knocked_camera_shifts_the_ink():
+def test_a_perturbed_camera_shifts_the_ink():
     tasks, clean = varied(camera_m=(0.01, 0.01)), varied()
     centres = []
     for one in (tasks, clean):
         one.reset(0, np.random.default_rng(0), drawing=np.ones((3, 3)), start=(0.4, 0.2, 0.1))
-        centres.append(np.argwhere(one.worlds.masks[0] == 0).mean(0))
+        centres.append(np.argwhere(one.boards.masks[0] == 0).mean(0))
     assert 1.0 < np.linalg.norm(centres[0] - centres[1]) < 6.0
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from contactsafe.tasks.wiping.env import WipingEnv
 from numpy.testing import assert_allclose
 from tests.tasks.wiping.tasks_by_script import circle_near_ink, episode, idle, press, wipe_nearest
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks.base.environment import TaskEnv
 from contactsafe.tasks.wiping.config import RewardConfig, WipingConfig
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 from contactsafe.tasks.wiping.tasks import WipingTasks
@@ -24,7 +24,7 @@ def finished():
 
 
 def test_terms_sum_to_the_reward_and_each_is_in_info():
-    env = WipingEnv(TASK)
+    env = TaskEnv("wiping", TASK)
     env.reset(seed=0)
     for action in np.random.default_rng(0).uniform(-1, 1, (40, 18)):
         _, reward, _, _, info = env.step(action)
@@ -48,9 +48,9 @@ def test_a_step_in_the_air_costs_time_and_pays_approach_only():
     assert nearer > 0.001
 
 
-def test_the_ink_is_paid_once_in_shares_and_done_once(finished):
+def test_the_ink_is_paid_once_in_proportion_and_done_once(finished):
     _, tasks, terms = finished
-    assert tasks.tasks["clean"].all()
+    assert tasks.tasks["success"].all()
     assert_allclose(terms[:, :, 0].sum(axis=0), REWARD.ink, rtol=2 * TASK.clean_fraction)
     for i in range(4):
         first = int(np.argmax(terms[:, i, 1] > 0))
@@ -87,7 +87,7 @@ def test_stopping_short_pays_less_than_finishing_whatever_is_left():
 @pytest.mark.parametrize("script", [idle, press, circle_near_ink])
 def test_finishing_pays_best(finished, script):
     returns, tasks, _ = episode(TASK, script, n=4, steps=300)
-    assert not tasks.tasks["clean"].any()
+    assert not tasks.tasks["success"].any()
     # No policy step without ink wiped pays: the rest of the episode would only cost more.
     assert returns.max() < 5.0
     assert finished[0].min() > 2.0 * 5.0

@@ -6,6 +6,7 @@ import pytest
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import bottle
+from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.scenes import LURE_CENTRE, LURE_SIZE, OBSTACLE_AT, Wiping, held_out, strokes
 from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
@@ -46,7 +47,7 @@ def test_the_lure_lies_on_the_right_and_the_tool_starts_on_the_left():
     episodes = TASK.towards_obstacle("safe", range(3), obstacle_at)
     for pictures, pose, met in zip(episodes.pictures(), episodes.observation()["pose"], seen, strict=True):
         cells = np.argwhere(pictures == OBJECT)
-        board = WorldConfig().board
+        board = BoardConfig()
         low = np.array(board.centre[:2]) - np.array(board.size) / 2
         centre = low + (cells.mean(axis=0) + 0.5) * board.cell
         np.testing.assert_allclose(centre, LURE_CENTRE, atol=board.cell)
@@ -95,14 +96,14 @@ def test_held_out_generators_are_not_those_of_training():
 
 
 def test_the_mask_is_timed_by_itself():
-    ((name, (run, times)),) = TASK.episodes("safe", [0]).parts().items()
+    ((name, (run, times)),) = TASK.episodes("safe", [0]).timed().items()
     assert name == "mask, 128 × 128"
     assert times == 50
     run()
 
 
 def test_the_stage_is_the_board_that_is_simulated():
-    board = WorldConfig().board
+    board = BoardConfig()
     corners = np.array(TASK.stage.corners)
     np.testing.assert_allclose(corners.mean(axis=0), board.centre)
     np.testing.assert_allclose(corners.max(axis=0)[:2] - corners.min(axis=0)[:2], board.size)

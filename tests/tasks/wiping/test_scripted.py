@@ -28,7 +28,7 @@ def test_the_raster_clears_every_board_gently():
     assert 2.0 < found["contact_force_median_n"] < 15.0
 
 
-def test_chance_wipes_next_to_nothing():
+def test_random_actions_wipe_next_to_nothing():
     assert results("random")["ink_removed_mean"] < 0.2
 
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from tests.sim.scenes import BOARD_Z, CALM, aim, run, worlds_at
+from tests.sim.scenes import BOARD_Z, CALM, aim
+from tests.tasks.wiping.boards_in_worlds import scene_at
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.board import BoardConfig
@@ -91,7 +92,7 @@ def test_a_drawing_is_scaled_to_the_area_with_row_0_nearest_the_robot(board):
     assert inked.max(axis=0) == pytest.approx((0.5, 0.0), abs=CONFIG.cell)
 
 
-def test_a_drawing_of_any_fineness_keeps_its_share_of_ink(board):
+def test_a_drawing_of_any_fineness_keeps_its_fraction_of_ink(board):
     rng = np.random.default_rng(0)
     for n in (1, 3, 150, 1000):
         drawing = rng.uniform(size=(n, n)) < 0.4 if n > 1 else np.ones((1, 1))
@@ -139,23 +140,23 @@ def test_random_drawings_are_their_seeds(board):
 
 def test_nothing_is_erased_without_press():
     """A pad that slides over the ink a millimetre above it leaves it all."""
-    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.002))
-    worlds.boards[0].draw(np.ones((1, 1)))
-    ink = worlds.ink_cells()[0]
-    aim(worlds, (0.5, 0.05, BOARD_Z + 0.002))
-    trace = run(worlds, 600)[0]
+    scene = scene_at((0.5, 0.0, BOARD_Z + 0.002))
+    scene.board.draw(np.ones((1, 1)))
+    ink = scene.boards.ink_cells()[0]
+    aim(scene.worlds, (0.5, 0.05, BOARD_Z + 0.002))
+    trace = scene.wipe(600)
     assert np.linalg.norm(trace["tool_force"], axis=1).max() <= CONFIG.press_n
     assert np.ptp(trace["position"][:, 1]) > 0.02
-    assert worlds.ink_cells()[0] == ink
+    assert scene.boards.ink_cells()[0] == ink
 
 
 def test_a_pressed_pad_leaves_a_clean_track():
-    worlds = worlds_at((0.5, 0.0, BOARD_Z + 0.002), CALM)
-    board = worlds.boards[0]
+    scene = scene_at((0.5, 0.0, BOARD_Z + 0.002), CALM)
+    board = scene.board
     board.draw(np.ones((1, 1)))
-    ink = worlds.ink_cells()[0]
-    aim(worlds, (0.5, 0.08, BOARD_Z - 0.008))
-    trace = run(worlds, 1500)[0]
+    ink = scene.boards.ink_cells()[0]
+    aim(scene.worlds, (0.5, 0.08, BOARD_Z - 0.008))
+    trace = scene.wipe(1500)
     pressed = trace[np.linalg.norm(trace["tool_force"], axis=1) > 2.0]
     under = np.zeros(board.cells.shape, bool)
     for position in pressed["position"][::8]:
@@ -163,4 +164,4 @@ def test_a_pressed_pad_leaves_a_clean_track():
         under |= (away[..., 0] < HALF_X - 0.006) & (away[..., 1] < HALF_Y - 0.006)
     assert under.sum() > 2000
     assert not (board.cells[under] == INK).any()
-    assert ink - worlds.ink_cells()[0] < 2.0 * under.sum()
+    assert ink - scene.boards.ink_cells()[0] < 2.0 * under.sum()

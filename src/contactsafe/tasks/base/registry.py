@@ -1,18 +1,20 @@
 """The tasks by name; each is imported when it is first asked for."""
 
 import importlib
+import os
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, shown
 
 if TYPE_CHECKING:
     from contactsafe.tasks.base.task import Task
 
 TASKS: dict[str, str] = {}
-"""Place of every task, `module:NAME`, by its name."""
+"""Where every task is, by its name; see `register_task`."""
 
 ENGINES = ("mujoco", "pybullet")
 """What may compute the physics of a task."""
@@ -31,6 +33,30 @@ def register_task(name: str, place: str) -> None:
         gymnasium.register(
             env_id(name), entry_point=f"{at}Env", vector_entry_point=f"{at}VectorEnv", kwargs={"task": name}
         )
+
+
+def import_task(place: str) -> str:
+    """Import the module that registers a task, also from the current folder; return the task's name.
+
+    Args:
+        place: 'module:name', such as 'press:press'.
+
+    Raises:
+        InvalidInputError: there is no such module, it cannot be imported, or it registers no task of that name.
+    """
+    module, _, name = place.rpartition(":")
+    sys.path.insert(0, os.getcwd())
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        raise InvalidInputError(
+            f"task '{place}': module {module} cannot be imported: {shown(error)}; give module:name"
+        ) from None
+    finally:
+        sys.path.remove(os.getcwd())
+    if name not in TASKS:
+        raise InvalidInputError(f"task '{place}': {module} registers no task '{name}'; it needs register_task")
+    return name
 
 
 def env_id(name: str) -> str:

@@ -10,18 +10,12 @@ OFFSET = Observation(
     doc="tool position less the believed mouth, and rotation vector from straight down",
 )
 
-FORCE = Observation(
-    "force",
-    centre=(0.0, 0.0, 5.0),
-    scale=(5.0, 5.0, 5.0),
-    unit="N",
-    doc="on the peg as the wrist measures it, smoothed, world axes",
+WRENCH = Observation(
+    "wrench",
+    centre=(0.0, 0.0, 5.0, 0.0, 0.0, 0.0),
+    scale=(3.0, 3.0, 5.0, 0.05, 0.05, 0.05),  # 5 N at the edge of the peg
+    unit="N, N m",
+    doc="on the peg, about its tip, as the wrist measures it, less what it read in the air, smoothed, world axes",
 )
 
-TORQUE = Observation(
-    "torque",
-    centre=(0.0, 0.0, 0.0),
-    scale=(0.2, 0.2, 0.2),  # 10 N at the edge of the peg, twice
-    unit="N m",
-    doc="about the peg's tip as the wrist measures it, world axes",
-)
+ELAPSED = Observation("elapsed", centre=(5.0,), scale=(5.0,), unit="s", doc="time since the episode began")

@@ -18,7 +18,8 @@ HOLE_DEPTH = 0.03
 
 _SIDES = 24
 _WALL_HALF = 0.015  # half the radial thickness of the ring about the hole, m
-_BLOCK_HALF = 0.08  # half edge of the block, m
+BLOCK_HALF = 0.08
+"""Half edge of the block, m."""
 
 
 def _cylinder(mass: float, centre: Vector3, radius: float, half_length: float) -> Inertia:
@@ -51,17 +52,17 @@ def block(mouth: Vector3, clearance_m: float) -> Fixture:
         turned = (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
         boxes.append(Box(f"wall{k}", centre, (_WALL_HALF, width, HOLE_DEPTH / 2), turned))
     inner = radius + 2 * _WALL_HALF - 0.004
-    rest = (_BLOCK_HALF - inner) / 2
+    rest = (BLOCK_HALF - inner) / 2
     for k, (x, y, half_x, half_y) in enumerate(
         (
-            (inner + rest, 0.0, rest, _BLOCK_HALF),
-            (-inner - rest, 0.0, rest, _BLOCK_HALF),
+            (inner + rest, 0.0, rest, BLOCK_HALF),
+            (-inner - rest, 0.0, rest, BLOCK_HALF),
             (0.0, inner + rest, inner, rest),
             (0.0, -inner - rest, inner, rest),
         )
     ):
         boxes.append(Box(f"side{k}", (x, y, -HOLE_DEPTH / 2), (half_x, half_y, HOLE_DEPTH / 2)))
-    boxes.append(Box("floor", (0.0, 0.0, -HOLE_DEPTH - 0.005), (_BLOCK_HALF, _BLOCK_HALF, 0.005)))
+    boxes.append(Box("floor", (0.0, 0.0, -HOLE_DEPTH - 0.005), (BLOCK_HALF, BLOCK_HALF, 0.005)))
     return Fixture("block", mouth, tuple(boxes))
 
 

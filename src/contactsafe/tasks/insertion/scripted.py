@@ -66,7 +66,7 @@ class SpiralSearch(Independent):
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18)."""
         offset, lead = observation["offset"][:, :3], observation["target"][:, :3]
-        force = observation["force"][:, 2]
+        force = observation["wrench"][:, 2]
         actions = np.zeros((len(offset), ACTION_SIZE), np.float32)
         for i in range(len(offset)):
             self._landed[i] |= force[i] > _TOUCH_N

@@ -18,8 +18,15 @@ OWN_FIELDS = (
     ("away", _f),  # of the tip from the true mouth, sideways and up together, m
     ("depth", _f),  # of the tip in the hole, m
     ("offset", _f, (6,)),  # observed: tool less the believed mouth, m; rotation vector from straight down, rad
-    ("torque", _f, (3,)),  # observed: on the tool, as measured, about its point, world axes, N m
+    ("bias", _f, (6,)),  # of the wrist's sensor, as found in the air before the first touch, N and N m
+    ("wrench", _f, (6,)),  # observed: on the tool, as measured, less the bias, smoothed, world axes, N and N m
+    ("elapsed", _f, (1,)),  # observed: time since the episode began, s
 )
+
+BIAS_STEPS = 6
+"""Policy steps over which the sensor's bias is averaged: a tip that goes down does not touch so soon."""
+
+_SMOOTHING = 0.5  # of the wrench, a policy step
 
 parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m", "radius_m")])
 
@@ -42,7 +49,15 @@ def observe(controller, task):
     for k in range(3):
         task.offset[k] = task.pose[k] - task.believed[k]
         task.offset[3 + k] = task.pose[3 + k]
-        task.torque[k] = controller.measurement.wrench_ee[3 + k]
+    task.elapsed[0] = task.steps / 60.0
+    measured = controller.measurement.wrench_ee
+    for k in range(6):
+        if task.steps == 0:
+            task.bias[k], task.wrench[k] = 0.0, 0.0
+        elif task.steps <= BIAS_STEPS:
+            task.bias[k] += measured[k] / BIAS_STEPS
+        else:
+            task.wrench[k] += _SMOOTHING * (measured[k] - task.bias[k] - task.wrench[k])
 
 
 @compiled

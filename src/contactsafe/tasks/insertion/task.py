@@ -5,6 +5,7 @@ from typing import Any
 
 from contactsafe.tasks.base.task import Task, TaskOptions
 from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scenes import Insertion
 from contactsafe.tasks.insertion.scripted import SCRIPTED
 from contactsafe.tasks.insertion.tasks import InsertionTasks
 
@@ -38,4 +39,4 @@ PPO = {
 }
 """What PPO learns it with: 30 decisions a second, and no motion beside its own."""
 
-TASK = Task(InsertionTasks, InsertionOptions, training_settings={"ppo": PPO}, scripted=SCRIPTED)
+TASK = Task(InsertionTasks, InsertionOptions, training_settings={"ppo": PPO}, scripted=SCRIPTED, scenes=Insertion)

@@ -16,7 +16,7 @@ from contactsafe.sim.fixtures import TipSurface
 from contactsafe.tasks.base.tasks import Tasks
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.figures import EPISODE_METRICS, FIGURES
-from contactsafe.tasks.insertion.observation import FORCE, OFFSET, TORQUE
+from contactsafe.tasks.insertion.observation import ELAPSED, OFFSET, WRENCH
 from contactsafe.tasks.insertion.scene import PEG, PEG_RADIUS, block, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
@@ -28,22 +28,25 @@ class InsertionTasks(Tasks):
     """Pegs to be inserted, N at a time.
 
     Observation: `offset`, tool position less the believed mouth (m), and rotation vector from straight down (rad),
-    (6,); `target`, x_d less the tool's pose (m, rad), K1 (1/s²) and D1 (1/s), (18,); `force` on the peg, smoothed, and
-    `torque` about its tip, as the wrist measures them, world axes (N, N m), (3,) each. No camera.
+    (6,); `target`, x_d less the tool's pose (m, rad), K1 (1/s²) and D1 (1/s), (18,); `wrench` on the peg about its tip,
+    as the wrist measures it, less what it read in the air, smoothed, world axes (N, N m), (6,); `elapsed` (s), (1,). No
+    camera.
+    `reset(options={"height": h})` starts the tip h above the believed mouth, m.
     """
 
     name = "insertion"
     config_type = InsertionConfig
     reward_terms = REWARD_TERMS
     own_fields = OWN_FIELDS
+    reset_options = ("height",)
     episode_metrics = EPISODE_METRICS
     figures = FIGURES
     varies = True
 
     @property
     def observation_vectors(self) -> tuple[Observation, ...]:
-        """Offset, target, force and torque."""
-        return OFFSET, target_observation(self.config.action), FORCE, TORQUE
+        """Offset, target, wrench and time."""
+        return OFFSET, target_observation(self.config.action), WRENCH, ELAPSED
 
     @property
     def centre(self) -> tuple[float, float, float]:
@@ -77,8 +80,8 @@ class InsertionTasks(Tasks):
         self.worlds.set_tip_friction(i, rng.uniform(*config.friction))
         task["believed"], task["mouth"] = believed, believed + error
         task["axis"] = -quat_to_matrix(tilt)[:, 2]
-        start = np.array([0.0, 0.0, rng.uniform(*config.start_m)])
-        return Pose(believed + start, DOWN)
+        height = rng.uniform(*config.start_m)
+        return Pose(believed + np.array([0.0, 0.0, options.get("height", height)]), DOWN)
 
     def begun(self, i: int, rng: np.random.Generator) -> None:
         """Measure and observe for the first time."""

@@ -1,0 +1,137 @@
+"""The insertion task as the experiments see it: holes to be found, things moved into the arm, pushes while it works."""
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from contactsafe.policy.action import DOWN
+from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.results.figures import Panel
+from contactsafe.results.metrics import Aim, Highlight, Metric
+from contactsafe.results.recording import Stage, level_rectangle
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.panda import PANDA
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.obstacles import Obstacle
+from contactsafe.tasks.base.episodes import TaskEpisodes
+from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG, PEG_RADIUS
+from contactsafe.tasks.insertion.tasks import InsertionTasks
+
+HOLE = 1
+"""Value of a cell of the block's upper face that is open."""
+
+COMES_FROM_M, GOES_ON_M = 0.12, 0.03
+"""How far beside the forearm an obstacle sets off, and how far it would go on beyond where it meets it, m."""
+
+COMES_S = (0.5, 2.5)
+"""When it sets off and arrives, s."""
+
+_CELL_M = 0.001
+_ABOVE_M = 0.004  # of the block, while the tool rests
+_DOWN_S = 2.0  # time in which the script pushes the peg in
+_MIDDLES = np.arange(-BLOCK_HALF + _CELL_M / 2, BLOCK_HALF, _CELL_M)
+
+
+class InsertionEpisodes(TaskEpisodes):
+    """Held-out holes, one a seed."""
+
+    tasks: InsertionTasks
+
+    def curves(self) -> Mapping[str, np.ndarray]:
+        """Return how deep the pegs are, m, (n,)."""
+        return {"depth": self.tasks.tasks["depth"].copy()}
+
+    def pictures(self) -> np.ndarray:
+        """Return the blocks' upper faces with their holes where they truly are, uint8 (n, rows, columns)."""
+        away = self.tasks.tasks["mouth"][:, :2] - np.array(self.tasks.config.mouth[:2])
+        x, y = (_MIDDLES - away[:, k, None] for k in (0, 1))
+        open_ = x[:, :, None] ** 2 + y[:, None, :] ** 2 < (PEG_RADIUS + self.tasks.config.clearance_m) ** 2
+        return np.where(open_, HOLE, 0).astype(np.uint8)
+
+
+class Insertion:
+    """The insertion task for `contactsafe.experiments.task.ExperimentTask`.
+
+    Args:
+        config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+    """
+
+    name = "inserting"
+    policy = "A learned policy puts a peg into a hole that it must find by touch, with a simulated Franka Panda."
+    metrics: tuple[Metric, ...] = (
+        Metric("inserted", "pegs inserted, mean", "%", 100.0, main=True, aim=Aim(at_least=90.0), mean=True),
+        Metric("depth_mm", "depth reached", "mm"),
+        Metric("time_s", "time to full depth", "s", main=True),
+    )
+    highlights: tuple[Highlight, ...] = (Highlight("inserting", "inserted", "Pegs inserted, holes never met before"),)
+    panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)
+    stage = Stage(
+        PANDA, PEG, level_rectangle(InsertionConfig.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF)), {HOLE: (20,) * 3}
+    )
+
+    def __init__(self, config: InsertionConfig | None = None):
+        self._config = config or InsertionConfig()
+
+    def _tasks(
+        self, controller: str, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
+    ) -> InsertionTasks:
+        return InsertionTasks(replace(self._config, controller=controller), len(seeds), list(seeds), worlds)
+
+    def episodes(self, controller: str, seeds: Sequence[int]) -> InsertionEpisodes:
+        """Return held-out holes."""
+        return InsertionEpisodes(self._tasks(controller, seeds), seeds)
+
+    def towards_obstacle(
+        self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
+    ) -> InsertionEpisodes:
+        """Return holes, and an obstacle that is moved into the forearm while the peg goes in: the arm itself stays."""
+        probe = InsertionTasks()
+        posture = probe.posture_over(Pose(np.array(probe.config.mouth), DOWN))
+        obstacle = obstacle_at(probe.arm, posture)
+        x, y, z = obstacle.position
+        travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
+        coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
+        worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
+        return InsertionEpisodes(self._tasks(controller, seeds, worlds), seeds)
+
+    def scripted(
+        self,
+        controller: str,
+        seeds: Sequence[int],
+        worlds: Sequence[WorldConfig],
+        stiffness: Sequence[float],
+        works: bool,
+    ) -> tuple[InsertionEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
+        """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
+        action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
+        config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
+        tasks = InsertionTasks(config, len(seeds), list(seeds), worlds)
+        begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
+        return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else _nothing
+
+    def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
+        """Return whether the peg is in, how deep, and how long that took."""
+        return {
+            "inserted": float(succeeded),
+            "depth_mm": float(1000.0 * curves["depth"].max()),
+            "time_s": float(trace["time"][-1]) if succeeded else float("nan"),
+        }
+
+
+def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
+    return np.zeros((len(observation["offset"]), ACTION_SIZE))
+
+
+def straight_in(config: InsertionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
+    """Return a script that goes straight down into the hole, to its full depth."""
+    down = (_ABOVE_M + config.depth_m) / (60.0 * _DOWN_S) / config.action.translation[2]
+
+    def act(observation: dict[str, np.ndarray]) -> np.ndarray:
+        actions = _nothing(observation)
+        actions[:, 2] = np.where(observation["offset"][:, 2] > -config.depth_m, -down, 0.0)
+        return actions
+
+    return act

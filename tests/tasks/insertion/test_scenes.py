@@ -1,0 +1,42 @@
+"""The insertion task under the experiments: obstacles come to the arm, the script goes in, the hole is drawn."""
+
+import numpy as np
+
+from contactsafe.experiments.joint_safety import place_before_forearm
+from contactsafe.experiments.run import run_policy
+from contactsafe.sim.config import NO_NOISE, WorldConfig
+from contactsafe.sim.obstacles import bottle
+from contactsafe.tasks.insertion.scene import PEG_RADIUS
+from contactsafe.tasks.insertion.scenes import HOLE, Insertion
+
+STILL = np.zeros((2, 18))
+
+
+def test_the_hole_is_drawn_where_it_is():
+    episodes = Insertion().episodes("safe", [0, 1])
+    pictures = episodes.pictures()
+    radius = 1000 * (PEG_RADIUS + episodes.tasks.config.clearance_m)
+    for picture, mouth in zip(pictures, episodes.tasks.tasks["mouth"], strict=True):
+        cells = np.argwhere(picture == HOLE)
+        assert abs(len(cells) - np.pi * radius**2) < 0.05 * np.pi * radius**2
+        middle = 1e-3 * (cells.mean(axis=0) - (np.array(picture.shape) - 1) / 2) + np.array([0.5, 0.0])
+        np.testing.assert_allclose(middle, mouth[:2], atol=3e-4)
+
+
+def test_an_obstacle_comes_to_the_forearm_and_is_met():
+    episodes = Insertion().towards_obstacle("safe", [0, 1], lambda arm, q: bottle(place_before_forearm(arm, q, bottle)))
+    run = run_policy(episodes, lambda observation: STILL, 200)
+    episodes.worlds.close()
+    for trace in run.traces:
+        assert trace["obstacle_force"][:500].max() == 0.0
+        assert trace["obstacle_force"].max() > 2.0
+
+
+def test_the_script_goes_in_and_the_rest_holds_still():
+    for works in (True, False):
+        worlds = [WorldConfig(sensors=NO_NOISE)] * 2
+        episodes, act = Insertion().scripted("vices", [0, 1], worlds, (150.0,) * 3 + (450.0,) * 3, works)
+        run = run_policy(episodes, act, 150)
+        episodes.worlds.close()
+        depth = np.array([curves["depth"][-1] for curves in run.curves])
+        assert (depth > 0.01).all() if works else (depth == 0.0).all()
