@@ -113,8 +113,8 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
             log.write({f"train/{name}": value for name, value in losses.items()}, epoch)
             state = {"model": vae.state_dict(), "optimiser": optimiser.state_dict()}
             save_checkpoint(out, {**state, "epochs_done": epoch + 1, "config": plain(config)})
-            report = reconstruction_report(vae, held_out)["all"]
-            log.write({f"held_out/{name}": value for name, value in report.items()}, epoch)
+            found = reconstruction_report(vae, held_out)["all"]
+            log.write({f"held_out/{name}": value for name, value in found.items()}, epoch)
 
     report = _report(vae, data, held_out, config)
     export_encoder(vae, out / ENCODER, report["size"])
