@@ -18,6 +18,7 @@ from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputE
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
+from contactsafe.policy.conditions import Conditions  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402
 from contactsafe.policy.manifest import digest  # noqa: E402
 from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
@@ -241,6 +242,33 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == (
         f"{path}: actions are not those of this version's tasks; export the bundle anew, or upgrade"
     )
+
+
+@pytest.mark.parametrize(
+    "conditions", [{"gains": "soft"}, {"controller": 3}, {"as_paper": "no"}, {"speed": 1.0}, {"gains": ["low"]}]
+)
+def test_conditions_that_cannot_be(bundle, conditions):
+    rewrite(bundle, conditions=conditions)
+    told = f"{bundle}/bundle.json: conditions are {conditions}; export the bundle anew"
+    assert refusal(bundle) == told
+
+
+def test_a_bundle_says_what_it_is_to_be_run_with(bundle):
+    rewrite(bundle, conditions={"controller": "vices", "gains": "low", "as_paper": True})
+    assert Bundle.load(bundle).conditions == Conditions("vices", "low", True)
+
+
+def test_a_network_of_six_outputs_is_exported_with_eighteen():
+    _, layers, scaling = networks()
+    first = torch.nn.Sequential(*layers[:-1], torch.nn.Linear(16, 6))
+    action = DeployedPolicy(first, scaling)(torch.ones(2, 6), torch.ones(2, 128))
+    assert action.shape == (2, 18)
+    assert torch.equal(action[:, 6:], torch.zeros(2, 12))
+    assert torch.equal(action[:, :6], DeployedPolicy(first, scaling).layers(scaled_ones(scaling)).clamp(-1, 1))
+
+
+def scaled_ones(scaling):
+    return torch.from_numpy(scaling({"pose": np.ones((2, 6))}, np.ones((2, 128), np.float32)))
 
 
 def test_not_a_model(bundle):
