@@ -40,7 +40,7 @@ class PolicyConfig:
 
     Attributes:
         encoder: folder of the vision encoder that `contactsafe train vae` leaves (encoder.json, and encoder.onnx where
-            it is learned); not read for a task without camera, and from Python None for a policy that sees no images.
+            it is learned); not read for a task without camera, and from Python empty for a policy that sees no images.
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         task: what is learned; from Python, any name for the environments that are handed over.
