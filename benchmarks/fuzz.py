@@ -1,4 +1,4 @@
-"""Damage bundles and checkpoints in every way that comes to mind, and see that each is refused in one line or harmless.
+"""Damage bundles and checkpoints in all manners, and see that each is refused in one line or harmless.
 
     python benchmarks/fuzz.py [--bundles 600] [--checkpoints 150] [--seed 0]
 
@@ -36,7 +36,7 @@ LONGEST_LINE = 600
 
 HOMOGRAPHY = np.array([[3.0, 0.2, 4.0], [0.1, 3.0, 5.0], [0.001, 0.002, 1.0]])
 
-HOSTILE = (
+ADVERSARIAL = (
     None, True, -1, 0, 1, 2**31, 2**62, 10**4000, -1e308, float("nan"), float("inf"), "", "x" * 900_000, "../../x",
     "\n", [], {}, [[]], {"a": {"a": {}}}, [0] * 1000,
 )  # fmt: skip
@@ -47,10 +47,10 @@ HOSTILE = (
 
 
 def damage_bundle(folder: Path, rng: random.Random) -> str:
-    """Damage one bundle; give the name of the way."""
-    way = rng.choice(BUNDLE_WAYS)
-    way(folder, rng)
-    return way.__name__.strip("_")
+    """Damage one bundle; return the name of the damage."""
+    damage = rng.choice(BUNDLE_DAMAGES)
+    damage(folder, rng)
+    return damage.__name__.strip("_")
 
 
 def _flip_bits(folder, rng):
@@ -78,7 +78,7 @@ def _change_manifest(folder, rng):
     if rng.random() < 0.2:
         del place[key]
     else:
-        place[key] = copy.deepcopy(rng.choice(HOSTILE))
+        place[key] = copy.deepcopy(rng.choice(ADVERSARIAL))
     _write(folder, manifest)
 
 
@@ -96,16 +96,16 @@ def _replace_file(folder, rng):
     path = folder / rng.choice((MANIFEST, POLICY))
     kept = folder.parent / "kept"
     path.rename(kept)
-    way = rng.randrange(6)
-    if way == 0:
+    damage = rng.randrange(6)
+    if damage == 0:
         path.mkdir()
-    elif way == 1:
+    elif damage == 1:
         os.mkfifo(path)
-    elif way == 2:
+    elif damage == 2:
         path.symlink_to(kept)
-    elif way == 3:
+    elif damage == 3:
         path.symlink_to(path)
-    elif way == 4:
+    elif damage == 4:
         path.symlink_to("/dev/zero")
     else:
         with path.open("wb") as file:
@@ -170,7 +170,7 @@ def _add_unknown_fields(folder, rng):
     _reseal(folder)
 
 
-BUNDLE_WAYS = (
+BUNDLE_DAMAGES = (
     _flip_bits, _flip_bits, _cut_or_grow, _change_manifest, _change_manifest, _break_json, _replace_file, _change_graph,
     _change_graph, _change_graph, _add_operators, _add_operators, _drop_ends, _add_unknown_fields,
 )  # fmt: skip
@@ -260,19 +260,19 @@ def try_bundle(folder: Path) -> None:
 
 
 def bundles(seed: int, items: range):
-    """Damage and try so many bundles; yield number, way and what came of it."""
+    """Damage and try so many bundles; yield number, damage and what came of it."""
     for i in items:
         with tempfile.TemporaryDirectory() as place:
             folder = shutil.copytree(shipped_bundle("wiping"), Path(place) / "bundle")
-            way = damage_bundle(folder, random.Random(f"{seed} {i}"))
-            yield i, way, outcome(lambda folder=folder: try_bundle(folder))
+            damage = damage_bundle(folder, random.Random(f"{seed} {i}"))
+            yield i, damage, outcome(lambda folder=folder: try_bundle(folder))
 
 
 # -- checkpoints ------------------------------------------------------------------------------------------------------
 
 
 def checkpoints(seed: int, items: range):
-    """Damage and try so many checkpoints of a small run on the real task; yield number, way and what came of it."""
+    """Damage and try so many checkpoints of a small run on the real task; yield number, damage and what came of it."""
     import gymnasium
     import torch
 
@@ -329,7 +329,7 @@ def checkpoints(seed: int, items: range):
             whole = path.read_bytes()
             memory = replay.read_bytes() if replay.exists() else None
             if rng.random() < 0.25:
-                way = "raw bytes"
+                damage = "raw bytes"
                 target = replay if memory and rng.random() < 0.3 else path
                 data = bytearray(target.read_bytes())
                 if rng.random() < 0.5:
@@ -338,14 +338,14 @@ def checkpoints(seed: int, items: range):
                     del data[rng.randrange(len(data)) :]
                 target.write_bytes(data)
             else:
-                way = "sealed anew"
+                damage = "sealed anew"
                 state = copy.deepcopy(state)
                 state["env"] = unpack(state["env"])
                 _corrupt(state, rng)
                 if isinstance(state.get("env"), dict):
                     state["env"] = pack(state["env"])
                 save_checkpoint(config.out, state)
-            yield i, way, outcome(lambda config=config, run=run: go_on(config, run))
+            yield i, damage, outcome(lambda config=config, run=run: go_on(config, run))
             path.write_bytes(whole)
             if memory is not None:
                 replay.write_bytes(memory)
@@ -375,7 +375,7 @@ def _corrupt(state, rng):
         if value.is_floating_point() and rng.random() < 0.5:
             place[key] = value * float("nan")
     else:
-        place[key] = copy.deepcopy(rng.choice([value for value in HOSTILE if value != 10**4000]))
+        place[key] = copy.deepcopy(rng.choice([value for value in ADVERSARIAL if value != 10**4000]))
 
 
 # -- both -------------------------------------------------------------------------------------------------------------
@@ -406,7 +406,7 @@ KINDS = {"bundles": bundles, "checkpoints": checkpoints}
 
 
 def in_batches(kind: str, seed: int, count: int):
-    """Run so many items in processes of their own; yield number, way and outcome of each."""
+    """Run so many items in processes of their own; yield number, damage and outcome of each."""
     for start in range(0, count, BATCH):
         stop = min(count, start + BATCH)
         command = [sys.executable, __file__, "--run", kind, str(seed), str(start), str(stop)]
@@ -434,12 +434,12 @@ def main() -> int:
     faults = 0
     for kind in KINDS:
         results = list(in_batches(kind, asked.seed, getattr(asked, kind)))
-        table = collections.Counter((way, result.partition(":")[0]) for _, way, result in results)
-        for (way, result), number in sorted(table.items()):
-            print(f"{kind:12s} {way:20s} {result:10s} {number:5d}")
-        for i, way, result in results:
+        table = collections.Counter((damage, result.partition(":")[0]) for _, damage, result in results)
+        for (damage, result), number in sorted(table.items()):
+            print(f"{kind:12s} {damage:20s} {result:10s} {number:5d}")
+        for i, damage, result in results:
             if result.startswith("FAULT"):
-                print(f"{kind} {i} {way}: {result}")
+                print(f"{kind} {i} {damage}: {result}")
                 faults += 1
         print(f"{kind}: {len(results)} tried, {sum(r == 'refused' for *_, r in results)} refused, {faults} faults")
     return bool(faults)

@@ -12,7 +12,6 @@ import tempfile
 import time
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
@@ -23,12 +22,10 @@ from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
-from contactsafe.sim.stepping import run_ticks, tool_position
-from contactsafe.tasks import WIPING
+from contactsafe.sim.stepping import run_ticks
+from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
-from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
-from contactsafe.tasks.wiping.randomisation import Randomisation
 
 ROLLOUTS = 6
 
@@ -65,8 +62,8 @@ def timed(owner, name, spent):
 
 def make(config):
     """Make the environment as `contactsafe train` does, on log-polar features whose statistics do not matter here."""
-    task = WipingConfig(randomisation=Randomisation.broad())
-    raw = gymnasium.make_vec(WIPING, num_envs=config.num_envs, config=task)
+    task = task_by_name(config.task)
+    raw = make_vec(task.name, config.num_envs, task.training_config(config.randomise, config.conditions))
     perception = Perception(None, "log_polar", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
     zeros = np.zeros(perception.latent_size)
     scaling = ObservationScaling.from_statistics(raw.unwrapped.observation_vectors, zeros, zeros + 1.0)
@@ -74,43 +71,55 @@ def make(config):
 
 
 @compiled
-def ticks_alone(worlds, noise, n):
-    plants, controllers, cells, reports, traces = worlds
-    for i in range(plants.shape[0]):
+def ticks_alone(worlds, controllers, noise, metrics, samples, trace, n):
+    for i in range(worlds.shape[0]):
         for _ in range(n):
-            run_ticks(plants[i], controllers[i], cells[i], noise[i], 17, reports[i], traces[i])
+            run_ticks(worlds[i], controllers[i], noise[i], 17, metrics[i], samples[i], trace)
 
 
 @compiled
-def ink_alone(worlds, cameras, ink_index, n):
-    plants, _, cells, _, _ = worlds
+def ink_alone(worlds, boards, cells, cameras, ink_index, n):
     found = 0
-    for i in range(plants.shape[0]):
-        camera = camera_at(cameras, plants[i].camera)
+    for i in range(worlds.shape[0]):
+        board = boards[i]
+        camera = camera_at(cameras, board.camera)
         for _ in range(n):
             remove_erased(ink_index, i, cells[i], camera.pixels)
-            place = tool_position(plants[i])
-            found += nearest_ink(ink_index, i, cells[i], plants[i].origin, plants[i].cell, place)[0]
+            found += nearest_ink(ink_index, i, cells[i], board.origin, board.cell, worlds[i].truth.position)[0]
     return found
 
 
 @compiled
-def masks_alone(worlds, cameras, ink_index, masks, n):
-    plants = worlds[0]
-    for i in range(plants.shape[0]):
-        camera = camera_at(cameras, plants[i].camera)
+def masks_alone(worlds, boards, cameras, ink_index, masks, n):
+    for i in range(worlds.shape[0]):
+        camera = camera_at(cameras, boards[i].camera)
         for _ in range(n):
-            render_mask_into(camera, ink_index.shown[i], plants[i], masks[i])
+            render_mask_into(camera, ink_index.shown[i], worlds[i].plant, masks[i])
 
 
 def processor_time(run, n, worlds):
-    """Give the processor time of one step of one world, µs: the least of several tries."""
+    """Return the processor time of one step of one world, µs: the least of several tries."""
     best = np.inf
     for _ in range(5):
         begun = time.thread_time()
         run(n)
         best = min(best, time.thread_time() - begun)
     return 1e6 * best / (n * worlds)
+
+
+def parts_alone(tasks):
+    """Return what runs one part of all worlds' steps n times, by what it is."""
+    worlds, boards = tasks.worlds, tasks.boards
+    records, looks = worlds.records, (boards.cameras, boards.ink_index)
+    ticks = (records, worlds.controllers, worlds.sample_noise(), worlds.metrics, worlds.samples, worlds.no_trace[0])
+    return {
+        "17 ticks of physics and control": lambda n: ticks_alone(*ticks, n),
+        "ink counted, nearest found (nothing wiped)": lambda n: ink_alone(
+            records, boards.records, boards.cells, *looks, n
+        ),
+        "mask": lambda n: masks_alone(records, boards.records, *looks, boards.masks, n),
+        "noise of the sensors": lambda n: [worlds.sample_noise() for _ in range(n)],
+    }
 
 
 def main() -> None:
@@ -142,20 +151,9 @@ def main() -> None:
         }
         for name, seconds in parts.items():
             print(f"{1e6 * seconds / steps:7.0f} us a step on the wall, {seconds / whole:4.0%}: {name}")
-        worlds = tasks.worlds
-        records = (worlds.plants, worlds.controllers, worlds.cells, worlds.reports, worlds.no_trace)
-        noise = worlds.sample_noise()
-        alone = {
-            "17 ticks of physics and control": lambda n: ticks_alone(records, noise, n),
-            "ink counted, nearest found (nothing wiped)": lambda n: ink_alone(
-                records, worlds.cameras, worlds.ink_index, n
-            ),
-            "mask": lambda n: masks_alone(records, worlds.cameras, worlds.ink_index, worlds.masks, n),
-            "noise of the sensors": lambda n: [worlds.sample_noise() for _ in range(n)],
-        }
-        for name, run in alone.items():
+        for name, run in parts_alone(tasks).items():
             run(1)
-            print(f"{processor_time(run, 4, worlds.n):7.1f} us of a core, one world: {name}")
+            print(f"{processor_time(run, 4, tasks.worlds.n):7.1f} us of a core, one world: {name}")
         env.close()
 
 

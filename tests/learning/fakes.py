@@ -50,15 +50,15 @@ class Board:
         self.total = len(self.points)
 
     def wipe(self, xy):
-        """Erase what lies under a square pad at xy; return the share of all ink erased."""
+        """Erase what lies under a square pad at xy; return the fraction of all ink erased."""
         kept = self.points[np.abs(self.points - xy).max(axis=1) > PAD_M / 2]
-        share = (len(self.points) - len(kept)) / self.total
+        fraction = (len(self.points) - len(kept)) / self.total
         self.points = kept
-        return share
+        return fraction
 
     @property
     def left(self):
-        """Share of the ink still there, 0..1."""
+        """Fraction of the ink still there, 0..1."""
         return len(self.points) / self.total
 
     def mask(self, homography):

@@ -77,7 +77,7 @@ def run(finished, encoder, tmp_path):
 
 
 def refusal(config):
-    """Give what is said of a run that cannot go on, less its path; nothing in its folder may change."""
+    """Return what is said of a run that cannot go on, less its path; nothing in its folder may change."""
     before = {path: path.read_bytes() for path in config.out.iterdir()}
     with pytest.raises(InvalidInputError) as error:
         train_policy(config, FakeWiping)

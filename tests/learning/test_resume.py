@@ -9,7 +9,6 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -20,16 +19,18 @@ pytest.importorskip("stable_baselines3")
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
 from tests.learning.fakes import FakeWiping  # noqa: E402
 
-import contactsafe  # noqa: E402, F401 -- registers the task
 from contactsafe.cli import main  # noqa: E402
 from contactsafe.core.copying import Threads  # noqa: E402
 from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
-from contactsafe.learning.checkpoints import as_started, load_checkpoint, pack, save_checkpoint, unpack  # noqa: E402
+from contactsafe.learning.checkpoints import load_checkpoint, save_checkpoint  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
+from contactsafe.learning.packing import pack, unpack  # noqa: E402
 from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
+from contactsafe.learning.settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
+from contactsafe.tasks import make_vec  # noqa: E402
 from contactsafe.tasks.wiping.config import WipingConfig  # noqa: E402
 
 SMALL = {"num_envs": 4, "rollout_steps": 16, "batch": 32, "net": (16, 16), "evaluate_episodes": 0, "total_steps": 512}
@@ -41,8 +42,8 @@ short_boards = partial(FakeWiping, max_steps=23)
 
 
 def real_boards(num_envs, seconds=0.3):
-    """Give the real task with episodes of 18 steps."""
-    return gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=num_envs, config=WipingConfig(episode_s=seconds))
+    """Make the real task with episodes of 18 steps."""
+    return make_vec("wiping", num_envs, WipingConfig(episode_s=seconds))
 
 
 def train_and_die(folder, config, make_env, calls=None, saves=None):
@@ -91,7 +92,7 @@ def no_bundles():
 
 @pytest.fixture(scope="module")
 def uninterrupted(encoder, tmp_path_factory):
-    """Give the last checkpoint of a run that was left alone."""
+    """Return the last checkpoint of a run that was left alone."""
     known = {}
 
     def run(config, make_env):

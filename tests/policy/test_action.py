@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.policy.action import DOWN, rotation_from_down
-from contactsafe.policy.action_config import ACTION_SIZE, ACTIONS, ActionConfig
+from contactsafe.policy.action_config import ACTION_SIZE, ACTIONS, GAINS, ActionConfig, action_limits, learned_actions
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -42,9 +43,9 @@ def test_steps_last_17_17_16_ticks(tasks):
     ticks = []
     for _ in range(9):
         tasks.step(np.zeros((1, 18)))
-        ticks.append(int(tasks.worlds.reports["ticks"][0]))
+        ticks.append(int(tasks.worlds.metrics["ticks"][0]))
     assert ticks == [17, 17, 16] * 3
-    assert tasks.worlds.plants[0]["tick"] == 150  # 9 steps of 1/60 s
+    assert tasks.worlds.records[0]["tick"] == 150  # 9 steps of 1/60 s
 
 
 @pytest.mark.parametrize("index", range(18), ids=ACTIONS)
@@ -73,17 +74,17 @@ def test_stiffness_and_damping_keep_to_their_range(tasks, sign):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_x_d_leads_the_tool_by_a_hand_at_most(tasks, sign):
+def test_x_d_keeps_within_a_hand_of_the_tool(tasks, sign):
     for _ in range(25):
         before = tasks.worlds.controllers[0]["output"]["position"].copy()
         act(tasks, slice(0, 2), sign)
-        lead = target_of(tasks)[:2] - before[:2]
-        assert np.abs(lead).max() <= CONFIG.offset_max + 1e-12
-    assert_allclose(np.abs(lead).max(), CONFIG.offset_max, atol=0.02)
+        offset = target_of(tasks)[:2] - before[:2]
+        assert np.abs(offset).max() <= CONFIG.offset_max + 1e-12
+    assert_allclose(np.abs(offset).max(), CONFIG.offset_max, atol=0.02)
 
 
 def test_x_d_keeps_to_its_box(tasks):
-    board = np.array(tasks.config.world.board.centre)
+    board = np.array(tasks.config.board.centre)
     act(tasks, 2, 1.0, steps=60)
     assert_allclose(target_of(tasks)[2], board[2] + CONFIG.height)
     act(tasks, 1, 1.0, steps=100)
@@ -127,3 +128,31 @@ def test_the_tool_goes_where_x_d_goes(tasks):
     act(tasks, 1, 0.0, steps=80)
     assert_allclose(tasks.tasks["pose"][0, :3], target_of(tasks)[:3], atol=0.01)
     assert tasks.tasks["pose"][0, 1] > 0.03
+
+
+CONSTANT = {"low": CONFIG.stiffness_low, "middle": (155.0,) * 3 + (475.0,) * 3, "high": CONFIG.stiffness_high}
+
+
+@pytest.mark.parametrize("gains", CONSTANT)
+def test_constant_gains_stay_whatever_is_asked_and_are_critical(gains):
+    made = WipingTasks(WipingConfig(controller="vices", action=ActionConfig(gains=gains)), seed=0)
+    made.reset(0, np.random.default_rng(0), start=(0.5, 0.0, 0.06))
+    for value in (1.0, -1.0, 0.3):
+        target = made.worlds.controllers[0]["target"]
+        assert_allclose(target["K_task"], CONSTANT[gains], rtol=1e-15)
+        assert_allclose(target["D_task"], 2.0 * np.sqrt(CONSTANT[gains]), rtol=1e-15)
+        act(made, slice(6, 18), value, steps=3)
+
+
+def test_learned_gains_have_the_range_and_the_start_that_are_configured():
+    limits = action_limits(CONFIG, (0.0, 0.0, 0.0))
+    assert_array_equal(limits.K_low, CONFIG.stiffness_low)
+    assert_array_equal(limits.D_high, CONFIG.damping_high)
+    assert_array_equal(CONFIG.stiffness_first, CONFIG.stiffness_start)
+
+
+def test_what_gains_leave_to_learn():
+    assert [learned_actions(gains) for gains in GAINS] == [18, 6, 6, 6]
+    with pytest.raises(InvalidInputError) as error:
+        ActionConfig(gains="soft")
+    assert str(error.value) == "gains = 'soft'; choose from learned, low, middle, high"

@@ -18,6 +18,7 @@ from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputE
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
 from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
+from contactsafe.policy.conditions import Conditions  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402
 from contactsafe.policy.manifest import digest  # noqa: E402
 from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
@@ -36,6 +37,7 @@ def listed(names):
 
 DESCRIPTION = {
     "task": "wiping",
+    "conditions": {"controller": "safe", "gains": "learned", "as_paper": False},
     "representation": "tool",
     "window_m": 0.64,
     "view_size": 32,
@@ -226,19 +228,47 @@ def test_manifest_damaged(bundle):
     assert refusal(bundle) == f"{path} is not a JSON object; the bundle is damaged, copy or export it anew"
     path.write_text(whole)
     rewrite(bundle, format=99)
-    assert refusal(bundle) == f"{path} has format 99, this version reads 4; export it anew, or upgrade"
-    rewrite(bundle, format=4, rate_hz="60")
+    assert refusal(bundle) == f"{path} has format 99, this version reads 5; export it anew, or upgrade"
+    rewrite(bundle, format=5, rate_hz="60")
     assert refusal(bundle) == f"{path}: rate_hz is '60', not float; export the bundle anew"
     rewrite(bundle, rate_hz=60.0, window_m=float("nan"))
     assert refusal(bundle) == f"{path}: window_m = nan is outside [0.01, 10.0]; export the bundle anew"
     rewrite(bundle, window_m=0.64, observes=["pose", "truth"])
     assert refusal(bundle) == (
-        f"{path}: observes is ['pose', 'truth'], not some of pose, target, force; export it anew"
+        f"{path}: observes is ['pose', 'truth'], not a list of names and sizes of vectors, each once; "
+        "export the bundle anew"
     )
-    rewrite(bundle, observes=["pose"], actions=["x"])
+    rewrite(bundle, observes=listed(["pose"]), actions=["x"])
     assert refusal(bundle) == (
-        f"{path}: actions are not those of this version's task; export the bundle anew, or upgrade"
+        f"{path}: actions are not those of this version's tasks; export the bundle anew, or upgrade"
     )
+
+
+@pytest.mark.parametrize(
+    "conditions", [{"gains": "soft"}, {"controller": 3}, {"as_paper": "no"}, {"speed": 1.0}, {"gains": ["low"]}]
+)
+def test_conditions_that_cannot_be(bundle, conditions):
+    rewrite(bundle, conditions=conditions)
+    told = f"{bundle}/bundle.json: conditions are {conditions}; export the bundle anew"
+    assert refusal(bundle) == told
+
+
+def test_a_bundle_says_what_it_is_to_be_run_with(bundle):
+    rewrite(bundle, conditions={"controller": "vices", "gains": "low", "as_paper": True})
+    assert Bundle.load(bundle).conditions == Conditions("vices", "low", True)
+
+
+def test_a_network_of_six_outputs_is_exported_with_eighteen():
+    _, layers, scaling = networks()
+    first = torch.nn.Sequential(*layers[:-1], torch.nn.Linear(16, 6))
+    action = DeployedPolicy(first, scaling)(torch.ones(2, 6), torch.ones(2, 128))
+    assert action.shape == (2, 18)
+    assert torch.equal(action[:, 6:], torch.zeros(2, 12))
+    assert torch.equal(action[:, :6], DeployedPolicy(first, scaling).layers(scaled_ones(scaling)).clamp(-1, 1))
+
+
+def scaled_ones(scaling):
+    return torch.from_numpy(scaling({"pose": np.ones((2, 6))}, np.ones((2, 128), np.float32)))
 
 
 def test_not_a_model(bundle):
@@ -519,7 +549,7 @@ def test_a_number_of_900_000_digits_is_no_json(bundle):
 
 def test_a_name_that_stands_twice_in_the_manifest_is_refused(bundle):
     text = (bundle / "bundle.json").read_text()
-    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 4,', 1))
+    (bundle / "bundle.json").write_text(text.replace("{", '{"format": 5,', 1))
     assert refusal(bundle) == (
         f"{bundle}/bundle.json says 'format' twice; the bundle is damaged, copy or export it anew"
     )

@@ -2,6 +2,7 @@
 
 import functools
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -33,6 +34,16 @@ def load_bundle(folder: Path | None, task: str = DEFAULT_TASK) -> Bundle:
     if of != task:
         raise InvalidInputError(f"{bundle.folder} is a policy for the task {of}, not for {task}; give --task {of}")
     return bundle
+
+
+def task_of(words: Sequence[str]) -> str:
+    """Return the task that words name; that decides which options there are, and their defaults."""
+    for k, word in enumerate(words):
+        name, _, value = word.partition("=")
+        value = value or "".join(words[k + 1 : k + 2])
+        if name == "--task" and value in TASKS:
+            return value
+    return DEFAULT_TASK
 
 
 @functools.cache

@@ -7,12 +7,15 @@ from typing import Annotated, Any
 
 import tyro
 
-from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress
+from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress, task_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
+from contactsafe.policy.bundle import Bundle
+from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.policy import Policy
 from contactsafe.results.experiment import to_json
-from contactsafe.tasks import DEFAULT_TASK, ENGINES, TASKS, make_vec, task_by_name
+from contactsafe.tasks import DEFAULT_TASK, ENGINES, make_vec, task_by_name
+from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, figures_of
 from contactsafe.tasks.base.figures import names
 from contactsafe.tasks.base.task import Task
@@ -53,13 +56,13 @@ def evaluate(arguments: Sequence[str]) -> None:
     Reports success, forces and times. For one seed and number of episodes all policies and controllers meet the same.
     The options from --controller on are those of the task.
     """
-    described = task_by_name(_task_of(arguments))
+    described = task_by_name(task_of(arguments))
     asked = parse(_options_of(described), "contactsafe evaluate", arguments, description=docstring(evaluate))
     asked.check()
     if asked.scripted is not None and asked.bundle is not None:
         raise InvalidInputError(f"a bundle and --scripted {asked.scripted} are both given; name one")
     bundle = None if asked.scripted else load_bundle(asked.bundle, described.name)
-    config = described.config(asked)
+    config = described.config(asked, None if bundle is None else bundle.conditions)
     most = _MOST_SIDE_BY_SIDE.get(asked.engine, 16)
     side_by_side = max(n for n in range(1, most + 1) if asked.episodes % n == 0)
     env = make_vec(described.name, side_by_side, config, asked.engine)
@@ -71,17 +74,7 @@ def evaluate(arguments: Sequence[str]) -> None:
         seed = HELD_OUT_SEED + asked.seed
         results = evaluate_policy(policy, env, asked.episodes, seed, on_episode=lambda record: bar.update())
     env.close()
-    _show(asked, results, names(figures_of(env)), _own_options(described))
-
-
-def _task_of(arguments: Sequence[str]) -> str:
-    """Return the task that words name; that decides which options there are."""
-    for k, word in enumerate(arguments):
-        name, _, value = word.partition("=")
-        value = value or "".join(arguments[k + 1 : k + 2])
-        if name == "--task" and value in TASKS:
-            return value
-    return DEFAULT_TASK
+    _show(asked, _conditions(config, bundle), results, names(figures_of(env)), _own_options(described))
 
 
 def _options_of(task: Task) -> type:
@@ -105,14 +98,21 @@ def _own_options(task: Task) -> list[str]:
     return [*own, "engine"]
 
 
-def _show(asked: Any, results: dict[str, Any], meaning: Any, own: list[str]) -> None:
+def _conditions(config: TaskConfig, bundle: Bundle | None) -> dict[str, Any]:
+    """Return under what the episodes ran: the controller, and what else of a policy's conditions is not the default."""
+    gains = {} if config.action.gains == Conditions.gains else {"gains": config.action.gains}
+    as_paper = {"as_paper": True} if bundle is not None and bundle.conditions.as_paper else {}
+    return {"controller": config.controller, **gains, **as_paper}
+
+
+def _show(asked: Any, conditions: dict[str, Any], results: dict[str, Any], meaning: Any, own: list[str]) -> None:
     records = results.pop("records")
     task = {name: getattr(asked, name) for name in own}
     said = {
         "task": asked.task,
         "policy": asked.scripted or str(asked.bundle or "shipped"),
         "seed": asked.seed,
-        "controller": asked.controller,
+        **conditions,
     }
     if asked.json:
         print(to_json({**results, **said, "options": task, "records": records}))

@@ -4,7 +4,6 @@ import datetime
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from contactsafe.core.parse import docstring, one_of, some_of
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, ExperimentConfig
 from contactsafe.experiments.task import ExperimentTask
+from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
@@ -48,8 +48,8 @@ def demo(
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
 
-    scenes = scenes_of(task)
-    config = ExperimentConfig(controllers, trials, seed, task=scenes, bundle=load_bundle(bundle, task))
+    loaded = load_bundle(bundle, task)
+    config = ExperimentConfig(controllers, trials, seed, task=scenes_of(task, loaded), bundle=loaded)
     folder = prepare_output(out)
     started = time.monotonic()
     results = _run(registry.PAPER, config)
@@ -95,9 +95,8 @@ def experiment(
 
     entry = registry.by_name(name)
     trials = entry.trials if trials is None else trials
-    config = ExperimentConfig(controllers, trials, seed, plants, minutes, scenes_of(task))
-    if bundle or entry.needs_policy:
-        config = replace(config, bundle=load_bundle(bundle, task))
+    loaded = load_bundle(bundle, task) if bundle or entry.needs_policy else None
+    config = ExperimentConfig(controllers, trials, seed, plants, minutes, scenes_of(task, loaded), loaded)
     folder = prepare_output(out) if out else None
     started = time.monotonic()
     results = _run([name], config)
@@ -113,16 +112,16 @@ experiment.__doc__ = docstring(experiment).replace(
 )
 
 
-def scenes_of(task: str) -> ExperimentTask:
-    """Return what the experiments ask of a task.
+def scenes_of(task: str, bundle: Bundle | None = None) -> ExperimentTask:
+    """Return what the experiments ask of a task, under the conditions of the policy that does it.
 
     Raises:
         InvalidInputError: no task has this name, or it has nothing for them.
     """
-    scenes = task_by_name(task).scenes
-    if scenes is None:
+    described = task_by_name(task)
+    if described.scenes is None:
         raise InvalidInputError(f"task '{task}' has no scenes for experiments; see docs/howto/own_task.md")
-    return scenes()
+    return described.scenes(described.config(None, None if bundle is None else bundle.conditions))
 
 
 def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:

@@ -28,7 +28,8 @@ def bench(json: bool = False, bundle: BundleFolder = None, task: TaskName = DEFA
     """
     from contactsafe.experiments.speed import ROUNDS, measure_speed
 
-    loaded, scenes = load_bundle(bundle, task), scenes_of(task)
+    loaded = load_bundle(bundle, task)
+    scenes = scenes_of(task, loaded)
     with progress("rounds", ROUNDS) as bar:
         speeds = measure_speed(scenes, loaded, bar.update)
     if json:

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from contactsafe.cli.common import COMPILES, first_run
+from contactsafe.cli.common import COMPILES, first_run, task_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import parse
 from contactsafe.policy.bundle import FOLDER
 from contactsafe.results.experiment import to_json
-from contactsafe.tasks import TASKS, task_by_name
+from contactsafe.tasks import DEFAULT_TASK, TASKS, task_by_name
 
 KINDS = ("vae", "ppo", "sac")
 
@@ -27,7 +27,8 @@ _HELP = f"""usage: contactsafe train {{{",".join(KINDS)}}} [options]
 and log to TensorBoard. A run that was stopped or killed goes on with --resume
 from its last epoch or rollout, with the settings of its last session where none
 are given, and ends with the weights that it would have had.
-`contactsafe train ppo --help` lists the settings of PPO."""
+`contactsafe train ppo --task NAME --help` lists the settings of PPO, and those
+that a task is learned with unless told otherwise."""
 
 
 def train(arguments: Sequence[str]) -> None:
@@ -49,18 +50,18 @@ def train(arguments: Sequence[str]) -> None:
         _train_policy(name, list(arguments[1:]))
 
 
-def _settings(kind: type, program: str, words: list[str]) -> Any:
+def _settings(kind: type, program: str, words: list[str], default: Any) -> Any:
     """Read the settings of a training; where it goes on, those of its last session stay unless words say otherwise."""
     from contactsafe.learning.settings import as_started
 
-    config = parse(kind, program, words)
+    config = parse(kind, program, words, default=default)
     return parse(kind, program, words, default=as_started(config)) if config.resume else config
 
 
 def _train_encoder(arguments: list[str]) -> None:
     from contactsafe.learning.train_vae import VaeConfig, train_vae
 
-    config = _settings(VaeConfig, "contactsafe train vae", arguments)
+    config = _settings(VaeConfig, "contactsafe train vae", arguments, VaeConfig())
     make_sampler = task_by_name(config.task).mask_sampler
     if make_sampler is None:
         raise InvalidInputError(f"task '{config.task}' has no camera; it needs no vision encoder")
@@ -75,10 +76,17 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     from contactsafe.learning.algorithms import ALGORITHMS
     from contactsafe.learning.train_policy import train_policy
 
-    config = _settings(ALGORITHMS[algorithm], f"contactsafe train {algorithm}", arguments)
+    kind, as_paper = ALGORITHMS[algorithm], not {"--as-paper", "--as_paper"}.isdisjoint(arguments)
+    usual = kind.for_task(task_of(arguments), as_paper)
+    config = _settings(kind, f"contactsafe train {algorithm}", arguments, usual)
     if first_run():
         print(f"contactsafe: {COMPILES}", file=sys.stderr)
     results = train_policy(config)
     if results:
         print(to_json(results))
-    print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}")
+    print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}{_task_words(config.task)}")
+
+
+def _task_words(task: str) -> str:
+    """Return the option that names a task, where it must be named."""
+    return "" if task == DEFAULT_TASK else f" --task {task}"

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import nn
 
 from contactsafe.core.errors import InvalidInputError
@@ -75,11 +76,16 @@ class PpoConfig(PolicyConfig):
         """Let exploration fall with the steps done."""
         done = min(model.num_timesteps / self.total_steps, 1.0)
         with torch.no_grad():
-            model.policy.log_std.fill_(self.log_std_init + done * (self.log_std_final - self.log_std_init))
+            _policy_of(model).log_std.fill_(self.log_std_init + done * (self.log_std_final - self.log_std_init))
 
     def actor(self, model: BaseAlgorithm) -> nn.Module:
         """Return the mean of the action distribution."""
-        return nn.Sequential(model.policy.mlp_extractor.policy_net, model.policy.action_net)
+        policy = _policy_of(model)
+        return nn.Sequential(policy.mlp_extractor.policy_net, policy.action_net)
+
+
+def _policy_of(model: BaseAlgorithm) -> ActorCriticPolicy:
+    return cast(ActorCriticPolicy, model.policy)
 
 
 @dataclass(frozen=True)
@@ -143,7 +149,8 @@ class SacConfig(PolicyConfig):
 
     def actor(self, model: BaseAlgorithm) -> nn.Module:
         """Return the squashed mean of the action distribution."""
-        return nn.Sequential(model.actor.latent_pi, model.actor.mu, nn.Tanh())
+        actor = cast(SAC, model).actor
+        return nn.Sequential(actor.latent_pi, actor.mu, nn.Tanh())
 
 
 ALGORITHMS = {config.algorithm: config for config in (PpoConfig, SacConfig)}

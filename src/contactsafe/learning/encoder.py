@@ -5,6 +5,7 @@ The policy reads "where is it" off that with a small network; off a dense code i
 """
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import torch
 from torch import nn
@@ -74,8 +75,8 @@ class VAE(nn.Module):
             nn.PixelShuffle(patch),
         )
         # Foreground is rare: start from a blank page, not from a grey one.
-        nn.init.constant_(self.decoder[-2].bias, -3.0)
-        self.to(memory_format=torch.channels_last)
+        nn.init.constant_(cast(torch.Tensor, self.decoder[-2].bias), -3.0)
+        cast(Any, self).to(memory_format=torch.channels_last)  # a form that torch's annotations leave out
 
     def encode(self, image: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return mean and log-variance of the latent, each (N, latent)."""

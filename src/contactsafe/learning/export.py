@@ -20,7 +20,7 @@ from contactsafe.core.errors import BundleError, ContactSafeError, OutputError
 from contactsafe.core.files import cannot_write, write_whole
 from contactsafe.learning.checkpoints import write_json
 from contactsafe.learning.encoder import VAE, MaskEncoder
-from contactsafe.policy.action_config import ACTIONS
+from contactsafe.policy.action_config import ACTION_SIZE, ACTIONS
 from contactsafe.policy.bundle import ENCODER, POLICY, Bundle
 from contactsafe.policy.manifest import FORMAT, MANIFEST, digest
 from contactsafe.policy.observation import ObservationScaling
@@ -40,10 +40,11 @@ class DeployedPolicy(nn.Module):
     """Raw state and latent to a clipped action: the scaling and the clipping travel inside the graph.
 
     Args:
-        layers: the trained network, scaled observation (N, k) to mean action (N, 18).
+        layers: the trained network, scaled observation (N, k) to the mean of the first actions; others are 0.
         scaling: that it was trained with.
     """
 
+    widen: torch.Tensor | None
     centre: torch.Tensor
     scale: torch.Tensor
 
@@ -53,12 +54,16 @@ class DeployedPolicy(nn.Module):
         self.clip = scaling.clip
         self.register_buffer("centre", torch.tensor(scaling.centre, dtype=torch.float32))
         self.register_buffer("scale", torch.tensor(scaling.scale, dtype=torch.float32))
+        with torch.no_grad():
+            learned = layers(torch.zeros(1, len(scaling.centre))).shape[1]
+        self.register_buffer("widen", None if learned == ACTION_SIZE else torch.eye(learned, ACTION_SIZE))
 
     def forward(self, state: torch.Tensor, latent: torch.Tensor | None = None) -> torch.Tensor:
         """Compute the action, (N, 18) in [-1, 1]."""
         observed = state if latent is None else torch.cat([state, latent], dim=1)
         scaled = (observed - self.centre) / self.scale
-        return self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
+        action = self.layers(scaled.clamp(-self.clip, self.clip)).clamp(-1.0, 1.0)
+        return action if self.widen is None else action @ self.widen
 
 
 @contextlib.contextmanager
@@ -102,6 +107,11 @@ def to_onnx(module: nn.Module, examples: Sequence[torch.Tensor], inputs: Sequenc
             verbose=False,
         )
         model = onnx.load(path)
+    return _without_traces(model).SerializeToString()
+
+
+def _without_traces(model: onnx.ModelProto) -> onnx.ModelProto:
+    """Clear what the exporter notes of its own run."""
     # Stack traces and local paths are noted in there; they are nobody's business.
     graph = model.graph
     ports = (*graph.input, *graph.output, *graph.value_info)
@@ -109,7 +119,7 @@ def to_onnx(module: nn.Module, examples: Sequence[torch.Tensor], inputs: Sequenc
         if hasattr(entry, "metadata_props"):
             del entry.metadata_props[:]
         entry.doc_string = ""
-    return model.SerializeToString()
+    return model
 
 
 def compare(module: nn.Module, data: bytes, name: str, examples: Sequence[torch.Tensor], inputs: Sequence[str]) -> None:
@@ -162,10 +172,10 @@ def export_bundle(
     Args:
         folder: where to; made anew.
         encoder: bytes of encoder.onnx; None for a representation that has none.
-        layers: the trained policy network, scaled observation (N, k) to mean action (N, 18).
+        layers: the trained policy network, scaled observation (N, k) to the mean of the first actions, all or some.
         scaling: that it was trained with.
-        description: task, representation, latent_size, window_m and view_size where it sees images, observes, rate_hz,
-            action_repeat, dither, training, results.
+        description: task, conditions, representation, latent_size, window_m and view_size where it sees images,
+            observes, rate_hz, action_repeat, dither, training, results.
         force: replace a folder that is there.
 
     Returns:

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
+from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of
-from contactsafe.tasks import DEFAULT_TASK, TASKS
+from contactsafe.policy.action_config import GAINS
+from contactsafe.policy.conditions import Conditions
+from contactsafe.tasks import DEFAULT_TASK, TASKS, task_by_name
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -37,10 +40,15 @@ class PolicyConfig:
 
     Attributes:
         encoder: folder of the vision encoder that `contactsafe train vae` leaves (encoder.json, and encoder.onnx where
-            it is learned); not read for a task without camera, and from Python None for a policy that sees no images.
+            it is learned); not read for a task without camera, and from Python empty for a policy that sees no images.
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         task: what is learned; from Python, any name for the environments that are handed over.
+        as_paper: configure task and training as the paper words them: free-space controller, pose and latent alone, its
+            reward; takes an encoder of `contactsafe train vae --representation paper`.
+        controller: preset underneath.
+        gains: who sets K1 and D1: the policy (learned), or nobody: K1 stays at the low end, in the middle or at the
+            high end of its range, D1 critical, and the policy has six actions in place of eighteen.
         randomise: train on worlds that differ from episode to episode; held-out episodes are of the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
@@ -69,6 +77,9 @@ class PolicyConfig:
     out: Path = Path("runs/policy")
     resume: bool = False
     task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
+    as_paper: bool = Conditions.as_paper
+    controller: Annotated[str, one_of(presets.PRESETS)] = Conditions.controller
+    gains: Annotated[str, one_of(GAINS)] = Conditions.gains
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
@@ -108,6 +119,26 @@ class PolicyConfig:
             raise InvalidInputError(f"observes = {self.observes}; give each vector once")
         if not 0.0 < self.discount <= 1.0:
             raise InvalidInputError(f"discount = {self.discount}; give more than 0, at most 1")
+
+    @classmethod
+    def for_task(cls, task: str, as_paper: bool = False, **settings: Any) -> Self:
+        """Return the settings with which a task is learned unless told otherwise.
+
+        Args:
+            task: by name.
+            as_paper: as the paper words them.
+            settings: that are told.
+
+        Raises:
+            InvalidInputError: no task has this name; the paper has no such task.
+        """
+        own = task_by_name(task).settings_of(cls.algorithm, as_paper)
+        return cls(**{**own, "task": task, "as_paper": as_paper, **settings})
+
+    @property
+    def conditions(self) -> Conditions:
+        """What the policy is to be run with, too."""
+        return Conditions(self.controller, self.gains, self.as_paper)
 
     def make_model(self, env: "EncodedVecEnv") -> "BaseAlgorithm":
         """Make an untrained model of Stable-Baselines3, on the CPU, seeded.

@@ -1,5 +1,6 @@
 """What can be read off a latent: recall and precision by amount of foreground, and where the nearest of it is."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -107,17 +108,23 @@ def nearest_foreground_error(
         "median_mm" and "p90_mm" of the error; "direction_p90_deg", of the direction, where that is 3 cm away or more;
         "guess_median_mm" of always naming the mean.
     """
-    generator = torch.Generator().manual_seed(seed)
     latents, vectors = _pairs(vae, data, window_m, count)
     test_latents, test_vectors = _pairs(vae, held_out, window_m, count)
+    guess = _fitted_reader(latents, vectors, steps, seed)(test_latents)
+    return _reader_errors(guess, test_vectors.numpy(), vectors.numpy().mean(0))
+
+
+def _fitted_reader(
+    latents: torch.Tensor, vectors: torch.Tensor, steps: int, seed: int
+) -> Callable[[torch.Tensor], np.ndarray]:
+    """Fit a small network from latents to vectors; return what reads vectors off latents, (N, 2), m."""
+    generator = torch.Generator().manual_seed(seed)
     centre, scale = latents.mean(0), latents.std(0).clamp(min=0.2)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        net = nn.Sequential(
-            nn.Linear(latents.shape[1], 128), nn.Tanh(), nn.Linear(128, 64), nn.Tanh(), nn.Linear(64, 2)
-        )
-    optimiser = torch.optim.Adam(net.parameters(), lr=2e-3)
-    unit = 0.1
+        first = nn.Linear(latents.shape[1], 128)
+        net = nn.Sequential(first, nn.Tanh(), nn.Linear(128, 64), nn.Tanh(), nn.Linear(64, 2))
+    optimiser, unit = torch.optim.Adam(net.parameters(), lr=2e-3), 0.1
     for step in range(steps):
         optimiser.param_groups[0]["lr"] = 2e-3 * (1.0 - step / steps)
         index = torch.randint(len(latents), (256,), generator=generator)
@@ -125,13 +132,19 @@ def nearest_foreground_error(
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
-    with torch.no_grad():
-        guess = (net((test_latents - centre) / scale) * unit).numpy()
-    truth = test_vectors.numpy()
+
+    def read(seen: torch.Tensor) -> np.ndarray:
+        with torch.no_grad():
+            return (net((seen - centre) / scale) * unit).numpy()
+
+    return read
+
+
+def _reader_errors(guess: np.ndarray, truth: np.ndarray, mean: np.ndarray) -> dict[str, float]:
     error = np.linalg.norm(guess - truth, axis=1)
     far = np.linalg.norm(truth, axis=1) >= 0.03
     cosine = (guess * truth).sum(1) / np.maximum(np.linalg.norm(guess, axis=1) * np.linalg.norm(truth, axis=1), 1e-9)
-    blind = np.linalg.norm(vectors.numpy().mean(0) - truth, axis=1)
+    blind = np.linalg.norm(mean - truth, axis=1)
     return {
         "median_mm": float(1e3 * np.median(error)),
         "p90_mm": float(1e3 * np.quantile(error, 0.9)),
@@ -144,11 +157,11 @@ def nearest_foreground_error(
 
 @torch.no_grad()
 def _pairs(vae: VAE, data: MaskDataset, window_m: float, count: int) -> tuple[torch.Tensor, torch.Tensor]:
-    latents, vectors = [], []
+    pairs = []
     for index in batches(min(count, len(data))):
         image = data.images(index)
-        latents.append(vae.encode(torch.from_numpy(image))[0])
-        vectors.append(torch.from_numpy(nearest_foreground(image, window_m)).float())
-    latents, vectors = torch.cat(latents), torch.cat(vectors)
+        latent = vae.encode(torch.from_numpy(image))[0]
+        pairs.append((latent, torch.from_numpy(nearest_foreground(image, window_m)).float()))
+    latents, vectors = (torch.cat(pieces) for pieces in zip(*pairs, strict=True))
     seen = torch.isfinite(vectors[:, 0])
     return latents[seen], vectors[seen]

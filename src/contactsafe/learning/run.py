@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from contactsafe.learning.vec_env import EncodedVecEnv
 
-FORMAT = 5
+FORMAT = 6
 """Version of the checkpoint's layout."""
 
 
@@ -81,10 +81,9 @@ class Run(OfTraining):
         self.saved_steps = -1
         tasks = getattr(env.env.unwrapped, "tasks", None)
         self.task: dict[str, Any] = {} if tasks is None else {"task": plain(tasks.config)}
-        slack = sb3.replay_slack(model, config.rollout_steps)
-        self.replay = None
-        if slack is not None:
-            self.replay = ReplayFile(config.out / "replay.bin", model.replay_buffer, slack)
+        buffer, self.replay = sb3.replay_buffer(model), None
+        if buffer is not None:
+            self.replay = ReplayFile(config.out / "replay.bin", buffer, sb3.replay_slack(model, config.rollout_steps))
 
     def save(self, minutes: float) -> None:
         """Write the checkpoint; call it between updates, when policy and optimiser fit together.
@@ -170,7 +169,7 @@ class Run(OfTraining):
             raise CheckpointError(f"successes are {shown(state['successes'])}")
 
     def _check_parameters(self, parameters: dict[str, Any]) -> None:
-        wanted = self.model.get_parameters()
+        wanted: dict[str, Any] = self.model.get_parameters()
         if set(parameters) != set(wanted):
             raise CheckpointError(f"parameters are {shown(sorted(map(str, parameters)))}, not {shown(sorted(wanted))}")
         for name, value in wanted.items():
@@ -198,7 +197,7 @@ class Run(OfTraining):
         if self.env.keeps_worlds:
             n, space = self.env.num_envs, self.env.observation_space
             for name, shape, kind in (
-                ("observation", (n, *space.shape), space.dtype),
+                ("observation", (n, *(space.shape or ())), space.dtype),
                 ("starts", (n,), np.dtype(bool)),
             ):
                 array = entry(env, name, np.ndarray)

@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.save_util import recursive_getattr
+from stable_baselines3.common.type_aliases import TrainFreq
 
 from contactsafe.core.errors import ContactSafeError
 
@@ -92,8 +95,12 @@ def component(model: BaseAlgorithm, name: str) -> Any:
     return recursive_getattr(model, name)
 
 
-def replay_slack(model: BaseAlgorithm, rollout_steps: int) -> int | None:
-    """Return the most rows that come into a model's replay buffer between checkpoints; None where it has none."""
-    if getattr(model, "replay_buffer", None) is None:
-        return None
-    return rollout_steps + int(model.train_freq.frequency)
+def replay_buffer(model: BaseAlgorithm) -> ReplayBuffer | None:
+    """Return a model's replay buffer; None where it has none."""
+    return model.replay_buffer if isinstance(model, OffPolicyAlgorithm) else None
+
+
+def replay_slack(model: BaseAlgorithm, rollout_steps: int) -> int:
+    """Return the most rows that come into a model's replay buffer between checkpoints."""
+    every = model.train_freq if isinstance(model, OffPolicyAlgorithm) else None
+    return rollout_steps + (int(every.frequency) if isinstance(every, TrainFreq) else 0)

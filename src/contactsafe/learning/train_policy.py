@@ -1,5 +1,6 @@
 """Train a policy on what a task lets it observe, with any algorithm of Stable-Baselines3; export and evaluate it."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -10,6 +11,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
 from tqdm import tqdm
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.checkpoints import run_folder, write_json
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.policy_config import PolicyConfig
@@ -18,13 +20,17 @@ from contactsafe.learning.run import Run, load_run
 from contactsafe.learning.settings import plain
 from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.learning.vision_encoder import VisionEncoder
+from contactsafe.policy.action_config import learned_actions
 from contactsafe.policy.bundle import FOLDER
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling, chosen
-from contactsafe.policy.perception import NO_IMAGE
+from contactsafe.policy.perception import NO_IMAGE, PAPER
 from contactsafe.policy.policy import Policy
 from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
+
+_NEVER = sys.maxsize
+"""Stable-Baselines3 logs once so many iterations; `Recorder` logs in its place."""
 
 MakeEnv = Callable[[int], Any]
 """`make_env(num_envs)` returns a task's vector environment."""
@@ -62,7 +68,7 @@ def train_policy(
 def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
     """Return how to make a task's environments: those for training, and the held-out ones."""
     task = task_by_name(config.task)
-    training, nominal = task.training_config(config.randomise), task.training_config(False)
+    training, nominal = (task.training_config(randomise, config.conditions) for randomise in (config.randomise, False))
     return lambda n: make_vec(task.name, n, training), lambda n: make_vec(task.name, n, nominal)
 
 
@@ -70,7 +76,14 @@ def _encoder(config: PolicyConfig) -> VisionEncoder | None:
     """Load the vision encoder; None where the policy is to see no images."""
     if config.encoder is None or (config.task in TASKS and task_by_name(config.task).mask_sampler is None):
         return None
-    return VisionEncoder.load(config.encoder)
+    encoder = VisionEncoder.load(config.encoder)
+    found = encoder.description["representation"]
+    if config.as_paper and found != PAPER:
+        raise InvalidInputError(
+            f"the encoder in {config.encoder} is of representation {found}, and the paper's is of {PAPER}; run "
+            f"`contactsafe train vae --representation {PAPER} --out runs/vae_paper` and give that folder as --encoder"
+        )
+    return encoder
 
 
 def _train(
@@ -116,7 +129,8 @@ def encoded(raw_env: Any, encoder: VisionEncoder | None, config: PolicyConfig) -
         perception = encoder.perception(_homography(raw_env), config.encoder_threads)
         statistics = encoder.description["latent_mean"], encoder.description["latent_std"]
     scaling = ObservationScaling.from_statistics(vectors, *statistics)
-    return EncodedVecEnv(raw_env, perception, scaling, config.action_repeat, config.reward_scale, dither)
+    repeat, actions = config.action_repeat, learned_actions(config.gains)
+    return EncodedVecEnv(raw_env, perception, scaling, repeat, config.reward_scale, dither, actions)
 
 
 def _learn(
@@ -131,7 +145,7 @@ def _learn(
     remaining = config.total_steps - model.num_timesteps
     if remaining > 0:
         model.set_logger(Logger(str(config.out), [Curves(config.out, model.num_timesteps)]))
-        model.learn(remaining, callback=recorder, log_interval=None, reset_num_timesteps=False)
+        model.learn(remaining, callback=recorder, log_interval=_NEVER, reset_num_timesteps=False)
         recorder.finish()
     return model, {"steps": run.saved_steps, "minutes": round(recorder.minutes(), 1)}
 
@@ -141,24 +155,11 @@ def _describe(
 ) -> dict[str, Any]:
     """Return what the bundle says of a policy beside its models."""
     spaces: Any = env.env.single_observation_space
-    training: dict[str, Any] = {config.algorithm: _portable(plain(config))}
-    image: dict[str, Any] = {"representation": NO_IMAGE, "latent_size": 0}
-    if encoder is not None:
-        said = encoder.description
-        image = {
-            "representation": said["representation"],
-            "window_m": said["window_m"],
-            "view_size": said["size"],
-            "latent_size": encoder.latent_size,
-        }
-        training["encoder"] = {
-            key: _portable(value) if key == "config" else value
-            for key, value in said.items()
-            if not key.startswith("latent_")
-        }
+    training = {config.algorithm: _portable(plain(config)), **_encoder_training(encoder)}
     return {
         "task": config.task,
-        **image,
+        "conditions": asdict(config.conditions),
+        **_image(encoder),
         "observes": [{"name": name, "size": spaces[name].shape[0]} for name in env.scaling.observes],
         "rate_hz": config.rate_hz,
         "action_repeat": config.action_repeat,
@@ -166,6 +167,23 @@ def _describe(
         "training": {**training, **effort},
         "results": {},
     }
+
+
+def _image(encoder: VisionEncoder | None) -> dict[str, Any]:
+    """Return what the bundle says of the pictures that a policy sees."""
+    if encoder is None:
+        return {"representation": NO_IMAGE, "latent_size": 0}
+    said = encoder.description
+    shape = {"representation": said["representation"], "window_m": said["window_m"], "view_size": said["size"]}
+    return {**shape, "latent_size": encoder.latent_size}
+
+
+def _encoder_training(encoder: VisionEncoder | None) -> dict[str, Any]:
+    """Return what the bundle says of how the encoder came about."""
+    if encoder is None:
+        return {}
+    said = {key: value for key, value in encoder.description.items() if not key.startswith("latent_")}
+    return {"encoder": {key: _portable(value) if key == "config" else value for key, value in said.items()}}
 
 
 def _portable(settings: dict[str, Any]) -> dict[str, Any]:

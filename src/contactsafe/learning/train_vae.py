@@ -50,7 +50,7 @@ class VaeConfig:
         learning_rate: of Adam; falls to a fiftieth along a half cosine.
         kl_weight: the paper's β.
         warmup_epochs: over which β rises from 0.
-        foreground_weight: how many blank pixels one ink pixel counts for.
+        foreground_weight: how many background pixels one foreground pixel counts for.
         probe_steps: of fitting the reader of "where is the nearest foreground" for the report; 0 for none.
         seed: of masks, weights and noise.
         threads: torch's. More than one crawls as soon as anything else wants a core.
@@ -91,29 +91,18 @@ def train_vae(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarr
         InvalidInputError: nothing to resume, or settings differ from those the run was started with.
     """
     with run_folder(config.out, config.resume) as out:
-        return _train(config, sample_masks, homography, out)
+        train = _report_log_polar if config.representation == "log_polar" else _train
+        report = train(config, sample_masks, homography, out)
+        write_json(out / ENCODER_DESCRIPTION, report)
+    return report
 
 
 def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray, out: Path) -> dict[str, Any]:
-    if config.representation == "log_polar":
-        report = _report_log_polar(config, sample_masks, homography)
-        write_json(out / ENCODER_DESCRIPTION, report)
-        return report
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     vae = VAE(config.encoder)
     optimiser = torch.optim.Adam(vae.parameters(), lr=config.learning_rate)
-    first_epoch = 0
-    if config.resume:
-        state = load_checkpoint(out)
-        with refused_as(out):
-            check_same_config(entry(state, "config", dict), config, may_differ=_MAY_DIFFER)
-            check_like(entry(state, "model", dict), dict(vae.state_dict()), "model")
-            check_optimiser(entry(state, "optimiser", dict), optimiser, "optimiser")
-            first_epoch = whole(state, "epochs_done")
-        vae.load_state_dict(state["model"])
-        optimiser.load_state_dict(state["optimiser"])
-
+    first_epoch = _go_on(config, vae, optimiser, out) if config.resume else 0
     view = (config.representation, config.window_m, config.encoder.size)
     data = make_dataset(sample_masks, homography, config.images, config.seed, *view)
     held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_SEED, *view)
@@ -124,13 +113,25 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
             log.write({f"train/{name}": value for name, value in losses.items()}, epoch)
             state = {"model": vae.state_dict(), "optimiser": optimiser.state_dict()}
             save_checkpoint(out, {**state, "epochs_done": epoch + 1, "config": plain(config)})
-            report = reconstruction_report(vae, held_out)["all"]
-            log.write({f"held_out/{name}": value for name, value in report.items()}, epoch)
+            found = reconstruction_report(vae, held_out)["all"]
+            log.write({f"held_out/{name}": value for name, value in found.items()}, epoch)
 
     report = _report(vae, data, held_out, config)
     export_encoder(vae, out / ENCODER, report["size"])
-    write_json(out / ENCODER_DESCRIPTION, report)
     return report
+
+
+def _go_on(config: VaeConfig, vae: VAE, optimiser: torch.optim.Optimizer, out: Path) -> int:
+    """Load network and optimiser from the checkpoint; return how many epochs they have seen."""
+    state = load_checkpoint(out)
+    with refused_as(out):
+        check_same_config(entry(state, "config", dict), config, may_differ=_MAY_DIFFER)
+        check_like(entry(state, "model", dict), dict(vae.state_dict()), "model")
+        check_optimiser(entry(state, "optimiser", dict), optimiser, "optimiser")
+        first_epoch = whole(state, "epochs_done")
+    vae.load_state_dict(state["model"])
+    optimiser.load_state_dict(state["optimiser"])
+    return first_epoch
 
 
 def _train_epoch(
@@ -158,7 +159,9 @@ def _train_epoch(
     return dict(zip(("loss", "reconstruction", "divergence"), totals / steps, strict=True))
 
 
-def _report_log_polar(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray) -> dict[str, Any]:
+def _report_log_polar(
+    config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray, out: Path
+) -> dict[str, Any]:
     """Measure the statistics of the log-polar features; they are of order one as they are."""
     masks, tools = sample_masks(config.held_out, config.seed)
     size = masks.shape[1]

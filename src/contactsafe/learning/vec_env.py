@@ -12,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.core.state import Entry, check_state_dict, load_state_dict, of_array, of_object, state_dict
+from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
@@ -36,6 +37,7 @@ class EncodedVecEnv(Independent, VecEnv):
         action_repeat: environment steps for which one action is given; their rewards are summed.
         reward_scale: rewards are multiplied by this; the metrics are not.
         dither: motion added to the actions.
+        actions: how many of them are learned, from the first on; the others are 0.
 
     Attributes:
         finished: metrics of the last 100 episodes, a dict each: return, steps, success, force_mean_n, force_peak_n,
@@ -53,6 +55,7 @@ class EncodedVecEnv(Independent, VecEnv):
         action_repeat: int = 1,
         reward_scale: float = 1.0,
         dither: Dither = _STILL,
+        actions: int = ACTION_SIZE,
     ):
         if env.metadata.get("autoreset_mode") != AutoresetMode.SAME_STEP:
             raise InvalidInputError(
@@ -68,8 +71,8 @@ class EncodedVecEnv(Independent, VecEnv):
         self.dither = dither
         self.finished: deque[dict[str, Any]] = deque(maxlen=RECENT)
         box = gymnasium.spaces.Box(-scaling.clip, scaling.clip, (len(scaling.centre),), np.float32)
-        super().__init__(env.num_envs, box, env.single_action_space)
-        self._actions = np.zeros((env.num_envs, *(env.single_action_space.shape or ())), np.float32)
+        super().__init__(env.num_envs, box, gymnasium.spaces.Box(-1.0, 1.0, (actions,), np.float32))
+        self._actions = np.zeros((env.num_envs, ACTION_SIZE), np.float32)
         self._seed: int | None = None
         self._tally: dict[str, np.ndarray] = {}
         self._steps = np.zeros(self.num_envs, int)
@@ -102,7 +105,8 @@ class EncodedVecEnv(Independent, VecEnv):
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for step_wait."""
-        self._actions = np.asarray(actions, np.float32)
+        self._actions = np.zeros((self.num_envs, ACTION_SIZE), np.float32)
+        self._actions[:, : actions.shape[1]] = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step: observation (N, k), reward (N,), done (N,), one info dict each."""

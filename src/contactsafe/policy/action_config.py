@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError, shown
+
 ACTIONS = tuple(
     f"{group}_{axis}"
     for group in ("x_d", "K_task", "D_task")
@@ -15,7 +17,17 @@ ACTIONS = tuple(
 
 ACTION_SIZE = len(ACTIONS)
 
+LEARNED_GAINS = "learned"
+
+GAINS = (LEARNED_GAINS, "low", "middle", "high")
+"""Who sets K1 and D1: the policy, or nobody: K1 stays at the low end, in the middle or at the high end of its range."""
+
 Six = tuple[float, float, float, float, float, float]
+
+
+def learned_actions(gains: str) -> int:
+    """Return how many of the actions have an effect, from the first on: with constant gains those that move x_d."""
+    return ACTION_SIZE if gains == LEARNED_GAINS else 6
 
 
 @dataclass(frozen=True)
@@ -38,6 +50,7 @@ class ActionConfig:
         stiffness_low, stiffness_high: range of K1, 1/s².
         damping_low, damping_high: range of D1, 1/s.
         stiffness_start: K1 at the start of an episode, 1/s²; D1 starts critical.
+        gains: one of `GAINS`; where not learned, the last twelve actions do nothing, K1 is constant and D1 critical.
     """
 
     translation: tuple[float, float, float] = (0.0067, 0.0067, 0.002)
@@ -55,6 +68,24 @@ class ActionConfig:
     damping_low: Six = (14.0, 14.0, 14.0, 30.0, 30.0, 30.0)
     damping_high: Six = (40.0, 40.0, 40.0, 60.0, 60.0, 60.0)
     stiffness_start: Six = (150.0, 150.0, 150.0, 450.0, 450.0, 450.0)
+    gains: str = LEARNED_GAINS
+
+    def __post_init__(self) -> None:
+        """Refuse gains that are unknown."""
+        if self.gains not in GAINS:
+            raise InvalidInputError(f"gains = {shown(self.gains)}; choose from {', '.join(GAINS)}")
+
+    @property
+    def stiffness_range(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest K1 that an episode sees, (6,) each, 1/s²; the same where gains are constant."""
+        low, high = np.array(self.stiffness_low), np.array(self.stiffness_high)
+        constant = {"low": low, "middle": (low + high) / 2.0, "high": high}.get(self.gains)
+        return (low, high) if constant is None else (constant, constant)
+
+    @property
+    def stiffness_first(self) -> np.ndarray:
+        """K1 at the start of an episode, (6,), 1/s²: `stiffness_start`, or where it always is."""
+        return np.array(self.stiffness_start) if self.gains == LEARNED_GAINS else self.stiffness_range[0]
 
 
 class ActionLimits(NamedTuple):
@@ -81,13 +112,17 @@ def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> A
     """Resolve an action configuration for a workspace around a point, world, m."""
     x, y, z = centre
     reach, tilt = config.reach, config.tilt
+    K_low, K_high = config.stiffness_range
+    D_low, D_high = np.array(config.damping_low), np.array(config.damping_high)
+    if config.gains != LEARNED_GAINS:
+        D_low = D_high = 2.0 * np.sqrt(K_low)
     return ActionLimits(
         step=np.array([*config.translation, *config.rotation, *config.stiffness, *config.damping]),
         low=np.array([x - reach, y - reach, z - config.press, -tilt, -tilt, -tilt]),
         high=np.array([x + reach, y + reach, z + config.height, tilt, tilt, tilt]),
-        K_low=np.array(config.stiffness_low),
-        K_high=np.array(config.stiffness_high),
-        D_low=np.array(config.damping_low),
-        D_high=np.array(config.damping_high),
+        K_low=K_low,
+        K_high=K_high,
+        D_low=D_low,
+        D_high=D_high,
         offset_max=np.array([config.offset_max, config.offset_max, config.offset_max_z]),
     )

@@ -16,6 +16,7 @@ import onnxruntime
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import BundleError
 from contactsafe.policy.action_config import ACTIONS
+from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.graph import Ports, check_ports, read_graph
 from contactsafe.policy.manifest import MANIFEST, digest, read_bounded, read_manifest
@@ -94,6 +95,11 @@ class Bundle(Independent):
     def dither(self) -> Dither:
         """The motion added to its actions."""
         return Dither(**self.manifest["dither"])
+
+    @property
+    def conditions(self) -> Conditions:
+        """What it is to be run with."""
+        return Conditions(**self.manifest["conditions"])
 
     @property
     def rate_hz(self) -> float:

@@ -9,11 +9,12 @@ from typing import Any
 
 from contactsafe.core.errors import BundleError, InvalidInputError, shown
 from contactsafe.policy.action_config import ACTIONS
+from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.perception import LEARNED, NO_IMAGE, REPRESENTATIONS
 from contactsafe.vision.log_polar import FEATURES
 
-FORMAT = 4
+FORMAT = 5
 """Version of the folder's layout; raised when an older reader would misread it."""
 
 MANIFEST = "bundle.json"
@@ -25,6 +26,7 @@ MAX_OBSERVED = 1024
 FIELDS: dict[str, type] = {
     "format": int,
     "task": str,
+    "conditions": dict,
     "representation": str,
     "latent_size": int,
     "observes": list,
@@ -84,6 +86,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         Dither(**manifest["dither"])
     except (TypeError, InvalidInputError) as error:
         raise BundleError(f"{path}: dither is {shown(manifest['dither'])}; export the bundle anew") from error
+    try:
+        Conditions(**manifest["conditions"])
+    except (TypeError, InvalidInputError) as error:
+        raise BundleError(f"{path}: conditions are {shown(manifest['conditions'])}; export the bundle anew") from error
     _check_observes(path, manifest["observes"])
     if manifest["actions"] != list(ACTIONS):
         raise BundleError(f"{path}: actions are not those of this version's tasks; export the bundle anew, or upgrade")

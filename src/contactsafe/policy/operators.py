@@ -22,7 +22,7 @@ class Value(NamedTuple):
 
 
 class NotAllowed(Exception):  # noqa: N818 -- an answer, caught next door, not an error
-    """An operator is used in a way that nothing here exports."""
+    """An operator is used as nothing here exports it."""
 
 
 class Call:
@@ -35,36 +35,36 @@ class Call:
             raise NotAllowed
 
     def rows(self, i: int) -> tuple[int, ...]:
-        """Give the shape of input i, which has a row for each of the batch; without the batch."""
+        """Return the shape of input i, which has a row for each of the batch; without the batch."""
         value = self.inputs[i]
         if value is None or value.constant is not None:
             raise NotAllowed
         return value.shape
 
     def constant(self, i: int) -> np.ndarray:
-        """Give input i, which is a constant."""
+        """Return input i, which is a constant."""
         value = self.inputs[i]
         if value is None or value.constant is None:
             raise NotAllowed
         return value.constant
 
     def number(self, name: str, default: int) -> int:
-        """Give an attribute that is a whole number."""
+        """Return an attribute that is a whole number."""
         return self._attributes[name].i if name in self._attributes else default
 
     def numbers(self, name: str, default: list[int]) -> list[int]:
-        """Give an attribute that is a list of whole numbers."""
+        """Return an attribute that is a list of whole numbers."""
         return list(self._attributes[name].ints) if name in self._attributes else default
 
     def axis(self, axis: int, rank: int) -> int:
-        """Give the place of an axis in a shape without the batch; the batch itself is no axis to work along."""
+        """Return the place of an axis in a shape without the batch; the batch itself is no axis to work along."""
         axis = axis + rank + 1 if axis < 0 else axis
         if not 1 <= axis <= rank:
             raise NotAllowed
         return axis - 1
 
     def text(self, name: str, default: bytes) -> bytes:
-        """Give an attribute that is a text."""
+        """Return an attribute that is a text."""
         return self._attributes[name].s if name in self._attributes else default
 
 
@@ -143,7 +143,7 @@ def _conv(call: Call) -> Shapes:
         len(size) == 2 and weights.ndim == 4 and len(strides) == 2 and len(pads) == 4 and dilations == [1, 1]
         and call.numbers("kernel_shape", kernel) == kernel and call.text("auto_pad", b"NOTSET") == b"NOTSET"
         and 1 <= group <= channels and weights.shape[1] * group == channels and weights.shape[0] % group == 0
-        and min(strides) >= 1 and all(0 <= pad < edge for pad, edge in zip(pads, 2 * kernel, strict=True))
+        and min(strides) >= 1 and all(0 <= margin < edge for margin, edge in zip(pads, 2 * kernel, strict=True))
         and (len(call.inputs) < 3 or call.constant(2).shape == weights.shape[:1])
     )  # fmt: skip
     if not plain:

@@ -9,7 +9,9 @@ from contactsafe.policy.graph import Graph, Ports, read_graph
 from contactsafe.vision.log_polar import CHUNKS, FEATURES, ground_of, log_polar_features
 from contactsafe.vision.rectify import rectify
 
-LEARNED = ("tool", "paper")
+PAPER = "paper"
+
+LEARNED = ("tool", PAPER)
 """Representations that need a trained encoder: a β-VAE of the mask in the tool's frame, or in the camera's."""
 
 NO_IMAGE = "none"

@@ -1,13 +1,16 @@
 """A task as everything that takes one by its name sees it: training, evaluation, experiments, the command line."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Protocol
 
 import numpy as np
+import tyro
 
 from contactsafe.control import presets
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of
+from contactsafe.policy.conditions import Conditions
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
@@ -24,6 +27,9 @@ class MaskSampler(Protocol):
         ...
 
 
+_AS_TRAINED = tyro.conf.arg(help_behavior_hint="(default: the one that the policy was trained over)")
+
+
 @dataclass(frozen=True)
 class TaskOptions:
     """What `contactsafe evaluate` can be told of any task; a task's own options extend them.
@@ -33,12 +39,26 @@ class TaskOptions:
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
     """
 
-    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name)] = TaskConfig.controller
+    controller: Annotated[str | None, one_of(presets.PRESETS, presets.by_name), _AS_TRAINED] = None
     pushed: bool = False
 
     def settings(self) -> dict[str, Any]:
         """Return the fields of the task's configuration that these options set."""
-        return {"controller": self.controller, "pushes": Pushes() if self.pushed else None}
+        named = {} if self.controller is None else {"controller": self.controller}
+        return {**named, "pushes": Pushes() if self.pushed else None}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Another wording of a task.
+
+    Attributes:
+        config: fields of its configuration that differ.
+        training: settings of training that differ, for any algorithm.
+    """
+
+    config: Mapping[str, Any] = field(default_factory=dict)
+    training: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -49,19 +69,23 @@ class Task:
         simulation: the task's subclass of `Tasks`.
         options: dataclass of the options that `contactsafe evaluate` has for it.
         training: fields of its configuration while a policy is trained with randomisation.
+        training_settings: settings of training that differ from an algorithm's own, by the name of the algorithm.
+        as_paper: the task and its training as the paper words them; None where the paper has no such task.
         scripted: scripted policies by name.
         mask_sampler: makes a MaskSampler; None where the task has no camera.
-        scenes: makes what the paper's experiments ask of it, see `contactsafe.experiments.task`; None where there is
-            nothing.
+        scenes: makes of its configuration what the paper's experiments ask of it, see `contactsafe.experiments.task`;
+            None where there is nothing.
         variants: what compiles besides, for `contactsafe warmup`: package that it needs, name, configuration, engine.
     """
 
     simulation: type[Tasks]
     options: type[TaskOptions] = TaskOptions
     training: Mapping[str, Any] = field(default_factory=dict)
+    training_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    as_paper: Variant | None = None
     scripted: Scripted = field(default_factory=lambda: RANDOM)
     mask_sampler: Callable[[], MaskSampler] | None = None
-    scenes: Callable[[], Any] | None = None
+    scenes: Callable[[Any], Any] | None = None
     variants: tuple[tuple[str, str, TaskConfig, str], ...] = ()
 
     @property
@@ -69,10 +93,27 @@ class Task:
         """What it is called, as in `--task NAME`."""
         return self.simulation.name
 
-    def config(self, options: TaskOptions | None = None) -> TaskConfig:
-        """Return the task's configuration under options."""
-        return self.simulation.config_type(**({} if options is None else options.settings()))
+    def config(self, options: TaskOptions | None = None, conditions: Conditions | None = None) -> TaskConfig:
+        """Return the task's configuration under options, and under the conditions of a policy."""
+        return self._under(conditions, {} if options is None else options.settings())
 
-    def training_config(self, randomise: bool) -> TaskConfig:
+    def training_config(self, randomise: bool, conditions: Conditions | None = None) -> TaskConfig:
         """Return the configuration that policies are trained under."""
-        return self.simulation.config_type(**(self.training if randomise else {}))
+        return self._under(conditions, self.training if randomise else {})
+
+    def settings_of(self, algorithm: str, as_paper: bool = False) -> dict[str, Any]:
+        """Return the settings of training that differ from an algorithm's own."""
+        return {**self.training_settings.get(algorithm, {}), **(self._paper().training if as_paper else {})}
+
+    def _under(self, conditions: Conditions | None, settings: Mapping[str, Any]) -> TaskConfig:
+        kind = self.simulation.config_type
+        if conditions is None:
+            return kind(**settings)
+        worded = self._paper().config if conditions.as_paper else {}
+        config = kind(**{"controller": conditions.controller, **worded, **settings})
+        return replace(config, action=replace(config.action, gains=conditions.gains))
+
+    def _paper(self) -> Variant:
+        if self.as_paper is None:
+            raise InvalidInputError(f"the paper has no task '{self.name}'; leave --as-paper out")
+        return self.as_paper

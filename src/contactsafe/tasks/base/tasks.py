@@ -170,7 +170,7 @@ class Tasks(Independent):
             self._pushes.begin(i, rng)
         controller = self.worlds.controllers[i]
         target = controller["target"]
-        target["K_task"] = self.config.action.stiffness_start
+        target["K_task"] = self.config.action.stiffness_first
         target["D_task"] = 2.0 * np.sqrt(target["K_task"])
         controller["output"]["position"] = controller["dynamics"]["position"]
         controller["output"]["rotation"] = controller["dynamics"]["rotation"]

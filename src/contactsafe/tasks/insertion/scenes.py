@@ -53,7 +53,11 @@ class InsertionEpisodes(TaskEpisodes):
 
 
 class Insertion:
-    """The insertion task for `contactsafe.experiments.task.ExperimentTask`."""
+    """The insertion task for `contactsafe.experiments.task.ExperimentTask`.
+
+    Args:
+        config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+    """
 
     name = "inserting"
     policy = "A learned policy puts a peg into a hole that it must find by touch, with a simulated Franka Panda."
@@ -68,9 +72,17 @@ class Insertion:
         PANDA, PEG, level_rectangle(InsertionConfig.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF)), {HOLE: (20,) * 3}
     )
 
+    def __init__(self, config: InsertionConfig | None = None):
+        self._config = config or InsertionConfig()
+
+    def _tasks(
+        self, controller: str, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
+    ) -> InsertionTasks:
+        return InsertionTasks(replace(self._config, controller=controller), len(seeds), list(seeds), worlds)
+
     def episodes(self, controller: str, seeds: Sequence[int]) -> InsertionEpisodes:
         """Return held-out holes."""
-        return InsertionEpisodes(_tasks(controller, seeds), seeds)
+        return InsertionEpisodes(self._tasks(controller, seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
@@ -83,7 +95,7 @@ class Insertion:
         travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
         coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
         worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
-        return InsertionEpisodes(_tasks(controller, seeds, worlds), seeds)
+        return InsertionEpisodes(self._tasks(controller, seeds, worlds), seeds)
 
     def scripted(
         self,
@@ -107,10 +119,6 @@ class Insertion:
             "depth_mm": float(1000.0 * curves["depth"].max()),
             "time_s": float(trace["time"][-1]) if succeeded else float("nan"),
         }
-
-
-def _tasks(controller: str, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None) -> InsertionTasks:
-    return InsertionTasks(InsertionConfig(controller=controller), len(seeds), list(seeds), worlds)
 
 
 def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:

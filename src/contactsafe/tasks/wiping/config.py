@@ -20,12 +20,15 @@ class RewardConfig:
         ink: for the whole of the ink, paid in proportion as it is wiped off.
         done: once, when all is gone.
         approach: per metre by which the nearest ink comes nearer, on steps that wipe nothing.
+        nearness: per step on ink, falling linearly to nothing at `nearness_m` from it; reported with `approach`.
         contact: per step with the pad on the board under `force_limit_n`.
         time: per step.
         force: per step at twice `gentle_n`, rising from zero at `gentle_n`, at most four times the weight.
         force_limit_n: the paper's 40 N.
         gentle_n: N.
+        nearness_m: m.
         arm_table: once, when any part but the pad meets board or table; the episode ends.
+        staying_pays: accept a reward that goes on while nothing is done.
     """
 
     ink: float = 10.0
@@ -37,14 +40,31 @@ class RewardConfig:
     force_limit_n: float = 40.0
     gentle_n: float = 7.0
     arm_table: float = -5.0
+    nearness: float = 0.0
+    nearness_m: float = 0.3
+    staying_pays: bool = False
 
     def __post_init__(self):
-        """Refuse a reward under which staying in contact for ever pays."""
-        if self.contact + self.time >= 0:
+        """Refuse a reward under which staying in contact for ever pays, unless that is asked for."""
+        staying = self.contact + self.nearness
+        if staying + self.time >= 0 and not self.staying_pays:
             raise InvalidInputError(
-                f"reward contact {self.contact} + time {self.time} ≥ 0 pays for never finishing; "
+                f"reward contact {staying} + time {self.time} ≥ 0 pays for never finishing; "
                 f"keep contact below {-self.time}"
             )
+        if not self.nearness_m > 0.0:
+            raise InvalidInputError(f"reward nearness_m = {self.nearness_m}; give more than 0 m")
+
+    @classmethod
+    def as_paper(cls) -> "RewardConfig":
+        """Return the reward in the paper's words (section IV-A), which leave its weights open.
+
+        Something for ink, something for the last of it, "a small reward if the agent keeps contacting the table and the
+        contact force is less than 40 N", "a small reward increasing as the distance [...] decreases" and "a large
+        penalty" for the arm on the table; nothing for time or force. Staying pays 0.01 a step at most, which a discount
+        of 0.995 makes 2 for ever: less than the 5 for the end.
+        """
+        return cls(approach=0.0, nearness=0.005, time=0.0, force=0.0, staying_pays=True)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,7 +58,11 @@ class WipingEpisodes(TaskEpisodes):
 
 
 class Wiping:
-    """The wiping task for `contactsafe.experiments.task.ExperimentTask`."""
+    """The wiping task for `contactsafe.experiments.task.ExperimentTask`.
+
+    Args:
+        config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+    """
 
     name = pictures.NAME
     policy = pictures.POLICY
@@ -66,9 +71,15 @@ class Wiping:
     panels: tuple[Panel, ...] = pictures.PANELS
     stage = pictures.STAGE
 
+    def __init__(self, config: WipingConfig | None = None):
+        self._config = config or WipingConfig()
+
+    def _under(self, controller: str) -> WipingConfig:
+        return replace(self._config, controller=controller)
+
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
         """Return held-out boards."""
-        return WipingEpisodes(WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds)), seeds)
+        return WipingEpisodes(WipingTasks(self._under(controller), len(seeds), list(seeds)), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
@@ -77,7 +88,7 @@ class Wiping:
         probe, rngs = WipingTasks(WipingConfig()), [held_out(seed) for seed in seeds]
         obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
         worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
-        tasks = WipingTasks(WipingConfig(controller=controller), len(seeds), list(seeds), worlds)
+        tasks = WipingTasks(self._under(controller), len(seeds), list(seeds), worlds)
         return WipingEpisodes(tasks, seeds, _lured, rngs)
 
     def scripted(

@@ -21,7 +21,10 @@ OWN_FIELDS = (
 )
 """What the task knows of one world beyond `task_dtype`."""
 
-rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "force_limit_n", "gentle_n", "clean_fraction")])
+WEIGHTS = ("nearness", "force_limit_n", "gentle_n", "nearness_m", "clean_fraction")
+"""What the reward is scored with beside the weight of each term."""
+
+rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, *WEIGHTS)])
 
 
 @compiled
@@ -39,6 +42,8 @@ def score(task, metrics, rewards, ink, distance):
     task.reward[0] = rewards.ink * wiped / max(task.ink_start, 1)
     task.reward[1] = rewards.done * task.success
     task.reward[2] = rewards.approach * (task.distance - distance) if wiped == 0 else 0.0
+    if rewards.nearness != 0.0:
+        task.reward[2] += rewards.nearness * max(1.0 - distance / rewards.nearness_m, 0.0)
     task.reward[3] = rewards.contact if touching else 0.0
     task.reward[4] = rewards.time
     task.reward[5] = rewards.force * excess

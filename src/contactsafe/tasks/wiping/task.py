@@ -1,10 +1,11 @@
 """The wiping task as everything that takes a task by its name sees it."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from contactsafe.tasks.base.task import Task, TaskOptions
-from contactsafe.tasks.wiping.config import ImageSource, WipingConfig
+from contactsafe.tasks.base.task import Task, TaskOptions, Variant
+from contactsafe.tasks.wiping.config import ImageSource, RewardConfig, WipingConfig
 from contactsafe.tasks.wiping.drawings import Boards
 from contactsafe.tasks.wiping.randomisation import Randomisation
 from contactsafe.tasks.wiping.sampling import MaskSampler
@@ -39,10 +40,23 @@ class WipingOptions(TaskOptions):
         }
 
 
+AS_PAPER = Variant(
+    config={"reward": RewardConfig.as_paper()},
+    training={
+        "encoder": Path("runs/vae_paper"),
+        "controller": "vices",
+        "observes": ("pose",),
+        "randomise": False,
+        "dither": 0.0,
+    },
+)
+"""Free-space controller, pose and latent alone, the reward in the paper's words, boards that differ in their ink."""
+
 TASK = Task(
     WipingTasks,
     WipingOptions,
     training={"randomisation": Randomisation.broad()},
+    as_paper=AS_PAPER,
     scripted=SCRIPTED,
     mask_sampler=MaskSampler,
     scenes=Wiping,

@@ -21,7 +21,7 @@ from contactsafe.tasks.wiping.drawings import paint_board
 from contactsafe.tasks.wiping.figures import EPISODE_METRICS, FIGURES
 from contactsafe.tasks.wiping.ink import nearest_ink
 from contactsafe.tasks.wiping.observation import observation_vectors
-from contactsafe.tasks.wiping.step import OWN_FIELDS, REWARD_TERMS, finish, observe, rewards_dtype
+from contactsafe.tasks.wiping.step import OWN_FIELDS, REWARD_TERMS, WEIGHTS, finish, observe, rewards_dtype
 from contactsafe.tasks.wiping.variation import Variation
 from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
@@ -77,7 +77,7 @@ class WipingTasks(Tasks):
         self._variation = None if ranges is None else Variation(self.worlds, self.boards, ranges)
         self._photographs = self._photograph_source()
         self._rewards = np.zeros(1, dtype=rewards_dtype)
-        for name in (*REWARD_TERMS, "force_limit_n", "gentle_n"):
+        for name in (*REWARD_TERMS, *WEIGHTS[:-1]):
             self._rewards[name] = getattr(config.reward, name)
         self._rewards["clean_fraction"] = config.clean_fraction
 
