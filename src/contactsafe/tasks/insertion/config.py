@@ -40,7 +40,7 @@ class InsertionReward:
     depth: float = 400.0
     done: float = 5.0
     time: float = -0.005
-    force: float = -0.01
+    force: float = -0.04
     gentle_n: float = 15.0
     arm_touched: float = -5.0
 

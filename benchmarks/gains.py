@@ -1,0 +1,105 @@
+"""Is variable impedance worth its twelve dimensions, and a bound in the controller worth anything to learning?
+
+    python benchmarks/gains.py --task insertion --out runs/gains [--seeds 3] [--episodes 200] [options of train ppo]
+
+Trains the same task with the gains set by the policy, and kept low, in the middle and high; and with the gains set by
+the policy over `vices`, where the reward alone asks for gentleness. Each with the same steps and seeds, one training
+after the other; those that are done already are not done again, and one that was stopped goes on. Then each policy, and
+each scripted one, meets the same held-out episodes, and a table is printed.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from contactsafe.tasks import TASKS, task_by_name
+
+VARIANTS = {
+    "policy sets the gains": (),
+    "constant, low": ("--gains", "low"),
+    "constant, middle": ("--gains", "middle"),
+    "constant, high": ("--gains", "high"),
+    "policy sets the gains, over vices": ("--controller", "vices"),
+}
+SUCCESS = 0.9
+
+
+def contactsafe(*words: str) -> str:
+    """Run a command; return what it printed."""
+    done = subprocess.run([sys.executable, "-m", "contactsafe", *words], stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout
+
+
+def train(task: str, out: Path, words: tuple[str, ...], seed: int, more: list[str]) -> None:
+    """Train one policy, or go on with it, unless it is done."""
+    if (out / "bundle" / "bundle.json").exists():
+        return
+    resume = ("--resume",) if (out / "checkpoint.pt").exists() else ()
+    common = ("--task", task, "--seed", str(seed), "--out", str(out), "--evaluate-episodes", "0")
+    contactsafe("train", "ppo", *common, *words, *more, *resume)
+
+
+def evaluate(task: str, bundle: Path, episodes: int) -> dict:
+    """Evaluate a policy, once: what was found is kept beside it."""
+    kept = bundle.parent / f"evaluation-{episodes}.json"
+    if not kept.exists():
+        printed = contactsafe("evaluate", str(bundle), "--task", task, "--episodes", str(episodes), "--json")
+        kept.write_text(printed, encoding="utf-8")
+    return json.loads(kept.read_text(encoding="utf-8"))
+
+
+def minutes_to_success(run: Path) -> float:
+    """Return when nine of the last hundred training episodes in ten succeeded, min; inf for never."""
+    log = EventAccumulator(str(run))
+    log.Reload()
+    minutes = {event.step: event.value for event in log.Scalars("time/minutes")}
+    return next((minutes[e.step] for e in log.Scalars("episode/success") if e.value >= SUCCESS), float("inf"))
+
+
+def row(name: str, minutes: list[float], found: list[dict]) -> str:
+    """Write a line of the table: the middle of the seeds, and the least and largest of them."""
+
+    def spread(key: str, scale: float = 1.0) -> str:
+        values = [np.nan if one[key] is None else scale * one[key] for one in found]
+        return f"{np.median(values):.3g} ({min(values):.3g} to {max(values):.3g})"
+
+    reached = ", ".join("never" if np.isinf(minute) else f"{minute:.1f}" for minute in minutes) or "-"
+    figures = [spread("success", 100.0), spread("time_to_success_median_s"), spread("contact_force_median_n")]
+    figures += [spread("peak_force_median_n"), f"{max(one['peak_force_max_n'] for one in found):.0f}"]
+    return f"| {name} | {reached} | {' | '.join(figures)} |"
+
+
+def main() -> None:
+    """Train, evaluate and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--task", choices=tuple(TASKS), default="insertion")
+    parser.add_argument("--out", type=Path, default=Path("runs/gains"))
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--episodes", type=int, default=200)
+    parser.add_argument("--only", nargs="*", choices=tuple(VARIANTS), default=tuple(VARIANTS))
+    options, more = parser.parse_known_args()
+    runs = {
+        (name, seed): options.out / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}"
+        for name in options.only
+        for seed in range(options.seeds)
+    }
+    for (name, seed), out in runs.items():
+        train(options.task, out, VARIANTS[name], seed, more)
+    head = "success, % | time to it, s | force in contact, N | largest force, median, N | largest of all, N"
+    print(f"| {options.task} | {SUCCESS:.0%} in training after, min | {head} |\n|---|---|---|---|---|---|---|")
+    for name in options.only:
+        outs = [runs[name, seed] for seed in range(options.seeds)]
+        found = [evaluate(options.task, out / "bundle", options.episodes) for out in outs]
+        print(row(name, [minutes_to_success(out) for out in outs], found))
+    for name in task_by_name(options.task).scripted:
+        words = ("--task", options.task, "--scripted", name, "--episodes", str(options.episodes), "--json")
+        print(row(f"script: {name}", [], [json.loads(contactsafe("evaluate", *words))]))
+
+
+if __name__ == "__main__":
+    main()
