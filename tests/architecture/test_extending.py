@@ -8,6 +8,8 @@ from tests.sim.nominal_backend import NominalBackend
 
 from contactsafe.control.parameter import allowed, fill_record, record_fields
 from contactsafe.policy.observation import Observation
+from contactsafe.robot.robots import panda
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks import TASKS, make_vec, register_task
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.tasks import InsertionTasks
@@ -62,8 +64,10 @@ def test_an_observation_and_a_task_are_a_class():
 
 
 def test_an_engine_is_a_class():
-    tasks = InsertionTasks(InsertionConfig(), 1, seed=0, backend=NominalBackend)
-    tasks.reset(0, np.random.default_rng(0))
+    worlds = Worlds(panda(), seed=0, backend=NominalBackend)
+    worlds.reset(0, worlds.arm.home)
+    start = worlds.records[0]["truth"]["position"].copy()
     for _ in range(6):
-        tasks.step(np.zeros((1, 18)))
-    assert np.abs(tasks.observation(0)["offset"][:2]).max() < 1e-3  # it holds still above the hole
+        worlds.run(17)
+    assert worlds.records[0]["tick"] == 102
+    assert np.abs(worlds.records[0]["truth"]["position"] - start).max() < 1e-3  # it holds still
