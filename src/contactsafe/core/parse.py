@@ -41,7 +41,7 @@ def one_of(names: Collection[str], check: Callable[[str], Any] | None = None) ->
     """Say in `Annotated` of a text that it is one of some names: help lists them, and no other passes.
 
     Args:
-        names: all there are, from where they are defined; those that are added later pass too.
+        names: all there are, from where they are defined.
         check: raises ValueError for a text that does not pass, where a name may have more behind it; None for names.
     """
     known = names
@@ -89,13 +89,14 @@ def _known(name: str, known: Collection[str]) -> str:
     return name
 
 
-def parse(what: Callable, program: str, words: Sequence[str], **options: Any) -> Any:
+def parse(what: Callable, program: str, words: Sequence[str], description: str | None = None, **options: Any) -> Any:
     """Turn words into what a dataclass or a function's arguments ask for.
 
     Args:
         what: dataclass to make, or function to call with what was said.
         program: how the command is called, for help and messages.
         words: after it.
+        description: what help says first; None for the docstring.
         options: of `tyro.cli`.
 
     Raises:
@@ -110,7 +111,7 @@ def parse(what: Callable, program: str, words: Sequence[str], **options: Any) ->
                 what,
                 prog=program,
                 args=list(words),
-                description=_description(docstring(what)),
+                description=_description(docstring(what) if description is None else description),
                 config=(tyro.conf.DisallowNone,),
                 **options,
             )
@@ -162,7 +163,7 @@ def _description(text: str) -> str:
 
 
 def _parts(what: Any) -> Iterator[Any]:
-    """Give the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
+    """Yield the dataclasses that say what is asked for: a dataclass, its bases, and those that its fields are of."""
     for kind in getattr(what, "__mro__", ()):
         if dataclasses.is_dataclass(kind):
             yield kind
