@@ -77,7 +77,7 @@ def some_of(
 
 
 def _checked(name: str, known: Collection[str], check: Callable[[str], Any] | None) -> str:
-    if check is None:
+    if check is None or name.isidentifier():
         return _known(name, known)
     check(name)
     return name
