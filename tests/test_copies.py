@@ -36,6 +36,7 @@ from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.base.scripted import RandomPolicy
 from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.scenes import Insertion
 from contactsafe.tasks.insertion.scripted import SpiralSearch, StraightDown
 from contactsafe.tasks.insertion.tasks import InsertionTasks
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -165,7 +166,7 @@ def act(policy):
 
 
 def search(script):
-    seen = {"offset": np.zeros((2, 6)), "target": np.zeros((2, 18)), "force": np.full((2, 3), 4.0)}
+    seen = {"offset": np.zeros((2, 6)), "target": np.zeros((2, 18)), "wrench": np.full((2, 6), 4.0)}
     return [script.act(seen) for _ in range(3)]
 
 
@@ -331,6 +332,8 @@ ACTORS = {
     "StraightDown": (begun(lambda: StraightDown(PUSHED, 2), search), search),
     "RandomPolicy": (lambda: RandomPolicy(2, 0), lambda r: [r.act(observation())]),
     "Threads": (begun(lambda: Threads(2), compute), compute),
+    "Insertion": (Insertion, lambda task: [np.array(task.stage.corners)]),
+    "InsertionEpisodes": (begun(lambda: Insertion().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
     "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Plotter": (plotter, lambda p: [p._count]),

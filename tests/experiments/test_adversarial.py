@@ -56,7 +56,7 @@ def test_energy_is_what_the_arm_does_against_the_external_torque():
     rows["tau_arm"][:, 0] = -5.0  # pressed against
     found = limit_metrics(rows, ARM, SAFE)
     assert found["energy_given_j"] == pytest.approx(0.5)
-    allowed = SAFE.tank_j + SAFE.tank_power_w * rows["time"][1:]
+    allowed = SAFE.limits.tank_j + SAFE.limits.tank_power_w * rows["time"][1:]
     assert found["energy_most_of_bound"] == pytest.approx((np.linspace(0, 0.5, 201)[1:] / allowed).max())
 
 

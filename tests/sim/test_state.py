@@ -121,7 +121,7 @@ def test_a_snapshot_of_something_else_is_refused(course):
     [
         ("records", "push.body", 10**9),
         ("records", "plant.tcp_site", 10**9),
-        ("controllers", "state.search_at", 10**9),
+        ("controllers", "state.isolation.search_at", 10**9),
         ("controllers", "state.turn", 7),
         ("controllers", "handle.surface_points", 10**9),
         ("controllers", "state.command.tau", np.nan),
