@@ -10,8 +10,8 @@ from contactsafe.tasks.base.config import TaskConfig
 ACTION = ActionConfig(
     translation=(0.0005, 0.0005, 0.0004),
     rotation=(0.0025, 0.0025, 0.0025),
-    offset_max=0.01,
-    offset_max_z=0.01,
+    offset_max=0.008,
+    offset_max_z=0.008,
     damping_low=(24.0, 24.0, 24.0, 40.0, 40.0, 40.0),
     damping_high=(45.0, 45.0, 45.0, 60.0, 60.0, 60.0),
     press=0.06,
@@ -40,7 +40,7 @@ class InsertionReward:
     depth: float = 400.0
     done: float = 5.0
     time: float = -0.005
-    force: float = -0.04
+    force: float = -0.03
     gentle_n: float = 15.0
     arm_touched: float = -5.0
 
