@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
+import tyro
+
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of
@@ -92,7 +94,7 @@ class PolicyConfig:
     action_repeat: int = 1
     dither: float = 0.3
     reward_scale: float = 1.0
-    observes: tuple[str, ...] = ()
+    observes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[NAME ...]")] = ()
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
