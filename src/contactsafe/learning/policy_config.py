@@ -94,7 +94,7 @@ class PolicyConfig:
     action_repeat: int = 1
     dither: float = 0.3
     reward_scale: float = 1.0
-    observes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[NAME ...]")] = ()
+    observes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
     rate_hz: float = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
