@@ -20,7 +20,7 @@ from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, 
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.conditions import Conditions  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402
-from contactsafe.policy.manifest import digest  # noqa: E402
+from contactsafe.policy.manifest import MANIFEST, digest  # noqa: E402
 from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
 from contactsafe.policy.operators import RULES  # noqa: E402
 from contactsafe.policy.policy import Policy  # noqa: E402
@@ -73,8 +73,8 @@ def bundle(exported, tmp_path):
     return shutil.copytree(exported, tmp_path / "bundle")
 
 
-def observations(n=5):
-    masks, tools = sample_masks(n, 1)
+def observations(n=5, seed=1):
+    masks, tools = sample_masks(n, seed)
     pose = np.zeros((n, 6), np.float32)
     pose[:, :3] = tools
     return {"pose": pose, "mask": masks[..., None]}
@@ -124,7 +124,22 @@ def test_one_or_many_the_same_again_and_clipped(exported):
         one = policy.act({key: value[i] for key, value in seen.items()})
         assert one.shape == (18,)
         np.testing.assert_allclose(one, actions[i], atol=1e-4)
-    assert (policy.rate_hz, policy.action_repeat) == (60.0, 1)
+    assert policy.rate_hz == 60.0
+
+
+def test_a_policy_that_decided_every_third_step_holds_its_action_in_between(exported, bundle):
+    manifest = json.loads((bundle / MANIFEST).read_text(encoding="utf-8"))
+    (bundle / MANIFEST).write_text(json.dumps({**manifest, "action_repeat": 3}), encoding="utf-8")
+    policy, every = Policy(bundle, H), Policy(exported, H)
+    seen = [observations(seed=seed) for seed in range(6)]
+    held = [policy.act(one) for one in seen]
+    for k in range(6):
+        np.testing.assert_array_equal(held[k], held[k - k % 3])
+    np.testing.assert_allclose(held[0], every.act(seen[0]), atol=1e-4)
+    policy.begin(1)  # its episode decides at once, the others when they would have
+    again = policy.act(observations(seed=7))
+    assert not np.array_equal(again[1], held[5][1])
+    assert np.array_equal(policy.act(observations(seed=8))[1], again[1])
 
 
 def test_camera_and_board_moved_with_a_new_calibration_change_nothing_but_the_pose(exported):

@@ -109,9 +109,9 @@ def policy_for(bundle: Bundle, episodes: Episodes) -> Policy:
     Raises:
         BundleError: it was trained for another rate.
     """
-    if bundle.rate_hz != POLICY_RATE_HZ or bundle.action_repeat != 1:
+    if bundle.rate_hz != POLICY_RATE_HZ:
         raise BundleError(
-            f"{bundle.folder} acts at {bundle.rate_hz:g} Hz, {bundle.action_repeat} steps an action; "
-            f"experiments run at {POLICY_RATE_HZ} Hz, one step an action: give a bundle trained so"
+            f"{bundle.folder} acts at {bundle.rate_hz:g} Hz; experiments run at {POLICY_RATE_HZ} Hz: give a bundle "
+            "trained so"
         )
     return Policy(bundle, episodes.camera_homography)

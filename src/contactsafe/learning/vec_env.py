@@ -113,9 +113,9 @@ class EncodedVecEnv(Independent, VecEnv):
         rewards = np.zeros(self.num_envs, np.float32)
         ended = np.zeros(self.num_envs, bool)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        actions = self._actions
+        actions = self.dither.over(self._actions, self._steps)
         for _ in range(self.action_repeat):
-            observation, reward, terminated, truncated, info = self.env.step(self.dither.over(actions, self._steps))
+            observation, reward, terminated, truncated, info = self.env.step(actions)
             done = np.asarray(terminated) | np.asarray(truncated)
             # What the next episode earns while the others finish their repeats belongs to neither transition.
             rewards[~ended] += np.asarray(reward)[~ended]

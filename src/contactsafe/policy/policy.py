@@ -16,8 +16,9 @@ from contactsafe.policy.perception import Perception
 class Policy(Independent):
     """The policy of a bundle: the mean of what was trained, and the dither added to it, which depends on time.
 
-    `begin` starts an episode; without it the dither goes on from where it is, which does no harm. For a batch, row i of
-    an observation belongs to episode i.
+    It is asked `rate_hz` times a second and decides as often as it did in training, every so many steps; in between
+    its last action holds. `begin` starts an episode; without it the dither goes on from where it is, which does no
+    harm. For a batch, row i of an observation belongs to episode i.
 
     Args:
         bundle: a Bundle, or the path of one.
@@ -32,10 +33,10 @@ class Policy(Independent):
 
     def __init__(self, bundle: Bundle | Path | str, homography: np.ndarray | None = None):
         self.bundle = bundle if isinstance(bundle, Bundle) else Bundle.load(bundle)
-        self.action_repeat = self.bundle.action_repeat
         self.rate_hz = self.bundle.rate_hz
         self._observes = self.bundle.observes
-        self._dither, self._steps = self.bundle.dither, np.zeros(1, int)
+        self._dither, self._repeat = self.bundle.dither, self.bundle.action_repeat
+        self._steps, self._held = np.zeros(1, int), np.zeros((1, ACTION_SIZE), np.float32)
         self._perceive = _perception(self.bundle, homography) if self.bundle.sees else None
         # The first runs allocate and compile: take them here, not in the control loop.
         for n in (1, 1, 2):
@@ -80,10 +81,11 @@ class Policy(Independent):
         if action.shape != (n, ACTION_SIZE) or not np.all(np.isfinite(action)):
             raise BundleError(f"{self.bundle.folder} gave an action that is not 18 finite numbers; do not run it")
         if len(self._steps) != n:
-            self._steps = np.zeros(n, int)
-        action = self._dither.over(action, self._steps)
+            self._steps, self._held = np.zeros(n, int), np.zeros((n, ACTION_SIZE), np.float32)
+        decides = self._steps % self._repeat == 0
+        self._held = np.where(decides[:, None], self._dither.over(action, self._steps), self._held)
         self._steps += 1
-        return action[0] if single else action
+        return self._held[0].copy() if single else self._held.copy()
 
     def _count(self, observation: Mapping[str, Any], first: str) -> int:
         """Return the number of rows of a batch: one for each mask, or for each of the first vector."""

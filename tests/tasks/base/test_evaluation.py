@@ -14,8 +14,6 @@ from contactsafe.tasks.base.evaluation import evaluate_policy, step_values
 class Seeker:
     """Goes straight to the nearest ink."""
 
-    action_repeat = 1
-
     def __init__(self, env):
         self.env = env
         self.calls = 0
@@ -54,14 +52,6 @@ def test_same_seed_same_figures():
     env = FakeWiping(3)
     first, second, other = (evaluate_policy(Seeker(env), env, 6, seed=s) for s in (1, 1, 2))
     assert first["records"] == second["records"] != other["records"]
-
-
-def test_repeated_actions_are_asked_for_once():
-    env = FakeWiping(2, max_steps=60)
-    policy = Idler(env)
-    policy.action_repeat = 4
-    evaluate_policy(policy, env, 2, seed=0)
-    assert policy.calls == 15
 
 
 def test_numbers_of_the_ended_episode_come_from_final_info():

@@ -19,8 +19,6 @@ HELD_OUT_SEED = 1_000_003
 class Actor(Protocol):
     """What is evaluated; where it keeps state of an episode it also has `begin(i)`."""
 
-    action_repeat: int
-
     def act(self, observation: Mapping[str, Any]) -> np.ndarray:
         """Choose the actions for a batch of observations."""
         ...
@@ -71,8 +69,8 @@ def evaluate_policy(
     Each environment runs the same number of episodes, so short ones are not counted more often than long ones.
 
     Args:
-        policy: has `act(observation)` for a batch and `action_repeat`; where it keeps something in mind, `begin(i)`
-            is called as an episode of environment i begins.
+        policy: has `act(observation)` for a batch; where it keeps something in mind, `begin(i)` is called as an
+            episode of environment i begins.
         vec_env: with AutoresetMode.SAME_STEP; its info has tool_force_n, is_success and what its metrics read.
         episodes: to run in all; rounded up to a multiple of vec_env.num_envs.
         seed: of the first reset; use one that training did not.
@@ -111,7 +109,6 @@ class _Run:
         self.on_episode = on_episode or (lambda record: None)
         self.begin = getattr(policy, "begin", lambda i: None)
         n = env.num_envs
-        self.held = np.zeros((n, *(env.single_action_space.shape or ())), np.float32)
         self.taken, self.peak, self.returns = np.zeros(n, int), np.zeros(n), np.zeros(n)
         self.records: list[list[dict]] = [[] for _ in range(n)]
         self.forces: list[np.ndarray] = []
@@ -128,10 +125,8 @@ class _Run:
             self.begin(k)
 
     def step(self) -> None:
-        fresh = self.taken % self.policy.action_repeat == 0
-        if fresh.any():
-            self.held = np.where(fresh[:, None], self.policy.act(self.observation), self.held)
-        self.observation, reward, terminated, truncated, info = self.env.step(self.held)
+        actions = self.policy.act(self.observation)
+        self.observation, reward, terminated, truncated, info = self.env.step(actions)
         done, active = np.asarray(terminated) | np.asarray(truncated), self.active
         force = step_values(info, done, "tool_force_n")
         self.steps += int(active.sum())

@@ -20,8 +20,6 @@ class RandomPolicy(Independent):
         seed: of the samples.
     """
 
-    action_repeat = 1
-
     def __init__(self, num_envs: int, seed: int):
         self._rng, self._shape = np.random.default_rng(seed), (num_envs, ACTION_SIZE)
 

@@ -30,8 +30,6 @@ class StraightDown(Independent):
         num_envs: tasks side by side.
     """
 
-    action_repeat = 1
-
     def __init__(self, config: InsertionConfig, num_envs: int):
         self._step = np.array(config.action.translation)
 
@@ -52,8 +50,6 @@ class SpiralSearch(Independent):
         config: of the task.
         num_envs: tasks side by side.
     """
-
-    action_repeat = 1
 
     def __init__(self, config: InsertionConfig, num_envs: int):
         self._step = np.array(config.action.translation)

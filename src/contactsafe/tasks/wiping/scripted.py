@@ -36,8 +36,6 @@ class _Script(Independent):
         num_envs: tasks side by side.
     """
 
-    action_repeat = 1
-
     def __init__(self, config: WipingConfig, num_envs: int):
         self.config = config
         self._landed = np.zeros(num_envs, bool)
