@@ -31,10 +31,10 @@ from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.worlds import Worlds
-from contactsafe.tasks.base.environment import TaskEnv
 from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.base.scripted import RandomPolicy
+from contactsafe.tasks.base.task_env import TaskEnv
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scripted import SpiralSearch, StraightDown
 from contactsafe.tasks.insertion.tasks import InsertionTasks

@@ -121,7 +121,7 @@ def _module(path: pathlib.Path) -> Room:
     room = Room(modules={name: text.count("\n")}, docstrings={name: ast.get_docstring(tree) is not None})
     for place, node, public in _definitions(tree, f"{name}:", True):
         special = node.name.startswith("__")
-        if public and not special:
+        if public and not special and not _is_setter(node):
             room.docstrings[place] = ast.get_docstring(node) is not None
         if isinstance(node, ast.ClassDef):
             continue
@@ -150,6 +150,11 @@ def _is_compiled(function: Function) -> bool:
     return any(
         (node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")) in COMPILED for node in called
     )
+
+
+def _is_setter(node: Function | ast.ClassDef) -> bool:
+    """Tell whether this sets a property: help shows the docstring of what reads it, and never this one's."""
+    return any(isinstance(decorator, ast.Attribute) and decorator.attr == "setter" for decorator in node.decorator_list)
 
 
 def _parameters(function: Function) -> list[ast.arg]:
