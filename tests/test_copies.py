@@ -22,7 +22,7 @@ import contactsafe as cs
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.copying import OfTraining, Threads, Unique
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import sample_motion
+from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
 from contactsafe.policy.bundle import Bundle, shipped_bundle
