@@ -340,7 +340,7 @@ ACTORS = {
 NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
 """PyTorch's own: it copies them."""
 
-BASES = {"Independent", "Tasks"}
+BASES = {"Environment", "Independent", "Tasks"}
 """Nothing by themselves: their subclasses have entries."""
 
 
