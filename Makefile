@@ -32,11 +32,12 @@ test: check  ## everything CI runs: check, then all tests (ARGS="-k name" passes
 portable: $(TEST_VENV)/.ready  ## all tests as on another processor: no instructions beyond the first ones (ARGS as for test)
 	$(TEST_BIN)/python tools/portable.py $(PYTEST) $(ARGS)
 
-check: $(TEST_VENV)/.ready  ## lint, format, types, direction of imports, documentation
+check: $(TEST_VENV)/.ready  ## lint, format, types, direction of imports, sizes, documentation
 	$(TEST_BIN)/ruff check .
 	$(TEST_BIN)/ruff format --check .
 	$(TEST_BIN)/mypy
 	$(TEST_BIN)/lint-imports
+	$(TEST_BIN)/python tools/sizes.py
 	$(TEST_BIN)/sphinx-build -W --keep-going -q -b html docs build/docs
 
 docs: $(TEST_VENV)/.ready  ## build the documentation in build/docs

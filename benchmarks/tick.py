@@ -36,7 +36,8 @@ def replay(controllers, q, qd, wrench, torque, modes):
 
 def record(path: Path) -> None:
     """Record a sweep into an obstacle and what follows."""
-    from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
+    from contactsafe.experiments.collision_motions import sample_motion
+    from contactsafe.experiments.collision_scenes import sample_meetings
     from contactsafe.experiments.motions import record as run
     from contactsafe.sim.worlds import Worlds
 

@@ -25,7 +25,8 @@ from contactsafe.control.laws import (
     torque_against_contact,
 )
 from contactsafe.experiments.adversarial import run_adversarial
-from contactsafe.experiments.collision_scenes import sample_meetings, sample_motion
+from contactsafe.experiments.collision_motions import sample_motion
+from contactsafe.experiments.collision_scenes import sample_meetings
 from contactsafe.experiments.collisions import run_battery
 from contactsafe.experiments.disturbance import PUSH_POINTS
 from contactsafe.experiments.false_alarms import false_alarm_trials, sample_strokes

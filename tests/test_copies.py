@@ -22,7 +22,7 @@ import contactsafe as cs
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.copying import OfTraining, Threads, Unique
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import sample_motion
+from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
 from contactsafe.policy.bundle import Bundle, shipped_bundle
@@ -31,10 +31,10 @@ from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.worlds import Worlds
-from contactsafe.tasks.base.environment import TaskEnv
 from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.base.scripted import RandomPolicy
+from contactsafe.tasks.base.task_env import TaskEnv
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scenes import Insertion
 from contactsafe.tasks.insertion.scripted import SpiralSearch, StraightDown
@@ -343,7 +343,7 @@ ACTORS = {
 NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
 """PyTorch's own: it copies them."""
 
-BASES = {"Independent", "Tasks"}
+BASES = {"Environment", "Independent", "Tasks"}
 """Nothing by themselves: their subclasses have entries."""
 
 

@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from contactsafe.cli import main
-from contactsafe.cli.compiling import steps
 from contactsafe.core.compiled import ANNOUNCEMENT
-from contactsafe.core.errors import InvalidInputError
 
 SIX = Path(__file__).parents[1] / "examples" / "own_scene.xml"
 
@@ -93,23 +90,3 @@ def test_what_compiles_says_so_once_beforehand_and_only_then(jit_cache, said, tm
     done = subprocess.run([sys.executable, "-c", TWICE], capture_output=True, text=True, check=True, env=environment)
     assert done.stderr.splitlines() == [ANNOUNCEMENT] * said
     assert done.stdout == ""
-
-
-def test_what_is_warmed_up_is_told_and_checked(capsys):
-    assert list(steps(["6", "7"]))[:3] == ["controller, 6 joints", "controller, 7 joints", "worlds"]
-    with pytest.raises(InvalidInputError) as caught:
-        steps(["0"])
-    assert str(caught.value) == "joints = 0; give numbers from 1 to 14, such as 6,7"
-    assert main(["warmup", "--joints", "many"]) == 2
-    assert capsys.readouterr().err.startswith("contactsafe: --joints: 'many' is unknown; choose from 1, 2, 3, ")
-
-
-@pytest.mark.slow
-def test_warming_up_says_where_it_lies(capsys):
-    """In the folder that the other tests have filled: each part runs."""
-    assert main(["warmup", "--joints", "7"]) == 0
-    said = capsys.readouterr()
-    from contactsafe.core.compiled import CACHE_FOLDER
-
-    assert CACHE_FOLDER in said.out
-    assert said.out.count("\n") == 1

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from contactsafe.control import presets
-from contactsafe.experiments.collision_scenes import (
+from contactsafe.experiments.collision_motions import (
     AFTER_S,
-    LINKS,
     SURFACE_CENTRE,
     TARGET_OFFSET_MAX_M,
-    sample_meetings,
     sample_motion,
-    sample_obstacle,
     sample_plant,
     scene_rng,
 )
+from contactsafe.experiments.collision_scenes import LINKS, sample_meetings, sample_obstacle
 from contactsafe.experiments.motions import Playback, record
 from contactsafe.experiments.surfaces import clearance
 from contactsafe.robot import robots

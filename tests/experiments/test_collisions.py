@@ -6,8 +6,10 @@ import pytest
 from contactsafe import presets
 from contactsafe.control.codes import COMPLY, REJECT
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import LINKS, sample_motion
-from contactsafe.experiments.collisions import collision_metrics, collisions, run_battery
+from contactsafe.experiments.collision_metrics import collision_metrics
+from contactsafe.experiments.collision_motions import sample_motion
+from contactsafe.experiments.collision_scenes import LINKS
+from contactsafe.experiments.collisions import collisions, run_battery
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.motions import record
 from contactsafe.experiments.registry import ENTRIES

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from contactsafe import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import false_alarms
-from contactsafe.experiments.collision_scenes import sample_motion
+from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.detection import detection, reporting
 from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_trials, sample_strokes

@@ -5,7 +5,8 @@ from dataclasses import astuple
 
 import pytest
 
-from contactsafe.experiments.verdict import WORST, compare, verdict_table, worst_tables
+from contactsafe.experiments.verdict import compare
+from contactsafe.experiments.verdict_tables import WORST, verdict_table, worst_tables
 from contactsafe.results.experiment import Trial
 
 NAN = float("nan")

@@ -28,7 +28,7 @@ COMMANDS = {
     "demo": _Command(demo),
     "train": _Command(train, parses=True),
     "evaluate": _Command(evaluate, parses=True),
-    "experiment": _Command(experiment),
+    "experiment": _Command(experiment, parses=True),
     "bench": _Command(bench),
     "warmup": _Command(warmup),
 }

@@ -4,6 +4,7 @@ import datetime
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,9 @@ import tyro
 
 from contactsafe.cli.common import BundleFolder, Controllers, TaskName, described, load_bundle, progress
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.core.parse import docstring, one_of, some_of
+from contactsafe.core.parse import docstring, one_of, parse, some_of
 from contactsafe.experiments import registry
-from contactsafe.experiments.config import PLANTS, ExperimentConfig
+from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
@@ -59,26 +60,11 @@ def demo(
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
 
 
-def experiment(
-    name: Annotated[str, one_of(registry.ENTRIES), tyro.conf.Positional],
-    controllers: Controllers = ExperimentConfig.controllers,
-    trials: Annotated[int | None, tyro.conf.arg(help_behavior_hint=f"(default: {_usual_trials()})")] = None,
-    seed: int = 0,
-    plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS,
-    minutes: float = ExperimentConfig.minutes,
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None,
-    json: bool = False,
-    bundle: BundleFolder = None,
-    task: TaskName = DEFAULT_TASK,
-) -> None:
-    """Run one of the experiments.
+@dataclass(frozen=True)
+class Options:
+    """What can be asked of an experiment.
 
-      EXPERIMENTS
-
-    The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
-    of any batch once more and draws it.
-
-    Args:
+    Attributes:
         name: what to run.
         controllers: presets to compare.
         trials: seeds tried with each controller.
@@ -90,21 +76,49 @@ def experiment(
         bundle: folder of another policy.
         task: what the policy does.
     """
+
+    name: Annotated[str, one_of(registry.ENTRIES), tyro.conf.Positional]
+    controllers: Controllers = ExperimentConfig.controllers
+    trials: Annotated[int | None, tyro.conf.arg(help_behavior_hint=f"(default: {_usual_trials()})")] = None
+    seed: int = 0
+    plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS
+    minutes: float = ExperimentConfig.minutes
+    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None
+    json: bool = False
+    bundle: BundleFolder = None
+    task: TaskName = DEFAULT_TASK
+
+
+def experiment(arguments: Sequence[str]) -> None:
+    """Run one of the experiments.
+
+      EXPERIMENTS
+
+    The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
+    of any batch once more and draws it.
+    """
     from contactsafe.report import prepare_output, terminal_table, write_report
     from contactsafe.report.summary import summarise
 
-    entry = registry.by_name(name)
-    trials = entry.trials if trials is None else trials
-    loaded = load_bundle(bundle, task) if bundle or entry.needs_policy else None
-    config = ExperimentConfig(controllers, trials, seed, plants, minutes, scenes_of(task, loaded), loaded)
-    folder = prepare_output(out) if out else None
+    asked = parse(Options, "contactsafe experiment", arguments, description=docstring(experiment))
+    entry = registry.by_name(asked.name)
+    config = _config(asked, entry)
+    folder = prepare_output(asked.out) if asked.out else None
     started = time.monotonic()
-    results = _run([name], config)
-    info = _run_info(f"contactsafe experiment {name}", task, config, time.monotonic() - started)
+    results = _run([asked.name], config)
+    info = _run_info(f"contactsafe experiment {asked.name}", asked.task, config, time.monotonic() - started)
     page = write_report(folder, results, info) if folder else None
-    print(to_json(summarise(results, info)) if json else terminal_table(results))
+    print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
     if page:
         print(f"report: {page}", file=sys.stderr)
+
+
+def _config(asked: Options, entry: Entry) -> ExperimentConfig:
+    """Return the configuration of an experiment as it was asked for; the policy is loaded where it needs one."""
+    trials = entry.trials if asked.trials is None else asked.trials
+    bundle = load_bundle(asked.bundle, asked.task) if asked.bundle or entry.needs_policy else None
+    scenes = scenes_of(asked.task, bundle)
+    return ExperimentConfig(asked.controllers, trials, asked.seed, asked.plants, asked.minutes, scenes, bundle)
 
 
 experiment.__doc__ = docstring(experiment).replace(

@@ -9,13 +9,13 @@ WORD = 8
 
 
 @compiled
-def words_of(flat):
+def words_of(flat: np.ndarray) -> np.ndarray:
     """See a row of pixels, uint8 (n,), as words, uint64 (n // 8,); they need not begin at a multiple of eight bytes."""
     return flat[: flat.shape[0] // WORD * WORD].view(np.uint64)
 
 
 @compiled
-def places_unlike(flat, bare, out):
+def places_unlike(flat: np.ndarray, bare: np.uint8, out: np.ndarray) -> int:
     """Find the pixels that are not bare.
 
     Args:
@@ -40,7 +40,7 @@ def places_unlike(flat, bare, out):
 
 
 @compiled
-def copy_picture(source, target):
+def copy_picture(source: np.ndarray, target: np.ndarray) -> None:
     """Copy a picture, uint8 of any shape, word by word: slices of two dimensions go pixel by pixel."""
     flat, out = source.reshape(-1), target.reshape(-1)
     words, out_words = words_of(flat), words_of(out)

@@ -8,7 +8,7 @@ import copy
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn, Self
 
 from contactsafe.core.errors import InvalidInputError
 
@@ -25,7 +25,7 @@ class Independent:
     def _bind(self) -> None:
         """Make what `_bound` names, from all other attributes."""
 
-    def __copy__(self):
+    def __copy__(self) -> Self:
         return copy.deepcopy(self)
 
     def __getstate__(self) -> dict[str, Any]:

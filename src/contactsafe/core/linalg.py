@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_matrix
 
 
 @compiled
-def spd_inverse(A, out):
+def spd_inverse(A: Matrix, out: Matrix) -> bool:
     """Invert a symmetric positive-definite matrix by Cholesky, A = L Lᵀ.
 
     Args:
@@ -59,13 +60,13 @@ def _cholesky(A, L):
 
 
 @compiled
-def matmul(A, B):
+def matmul(A: Matrix, B: Matrix) -> Matrix:
     """Multiply two small matrices, (m, k) and (k, n)."""
     return matmul_into(A, B, np.empty((A.shape[0], B.shape[1])))
 
 
 @compiled
-def matmul_into(A, B, out):
+def matmul_into(A: Matrix, B: Matrix, out: Matrix) -> Matrix:
     """Write A B to `out`, which is neither of them, and give it back."""
     out[:] = 0.0
     for i in range(A.shape[0]):
@@ -77,13 +78,13 @@ def matmul_into(A, B, out):
 
 
 @compiled
-def matvec(A, x):
+def matvec(A: Matrix, x: Vector) -> Vector:
     """Multiply a small matrix and a vector, (m, n) and (n,)."""
     return matvec_into(A, x, np.empty(A.shape[0]))
 
 
 @compiled
-def matvec_into(A, x, out):
+def matvec_into(A: Matrix, x: Vector, out: Vector) -> Vector:
     """Write A x to `out`, which is not x, and give it back."""
     for i in range(A.shape[0]):
         s = 0.0
@@ -94,13 +95,13 @@ def matvec_into(A, x, out):
 
 
 @compiled
-def matvec_t(A, x):
+def matvec_t(A: Matrix, x: Vector) -> Vector:
     """Multiply a transposed small matrix and a vector, Aᵀ x with (m, n) and (m,)."""
     return matvec_t_into(A, x, np.empty(A.shape[1]))
 
 
 @compiled
-def matvec_t_into(A, x, out):
+def matvec_t_into(A: Matrix, x: Vector, out: Vector) -> Vector:
     """Write Aᵀ x to `out`, which is not x, and give it back."""
     out[:] = 0.0
     for i in range(A.shape[0]):
@@ -111,7 +112,7 @@ def matvec_t_into(A, x, out):
 
 
 @compiled
-def dot(x, y):
+def dot(x: Vector, y: Vector) -> float:
     """Multiply two small vectors, (n,) and (n,)."""
     s = 0.0
     for i in range(x.shape[0]):
@@ -120,13 +121,13 @@ def dot(x, y):
 
 
 @compiled
-def cross(x, y):
+def cross(x: Vector, y: Vector) -> Vector:
     """Give x × y, (3,)."""
     return cross_into(x, y, np.empty(3))
 
 
 @compiled
-def cross_into(x, y, out):
+def cross_into(x: Vector, y: Vector, out: Vector) -> Vector:
     """Write x × y, (3,), to `out`, which is neither of them, and give it back."""
     out[0] = x[1] * y[2] - x[2] * y[1]
     out[1] = x[2] * y[0] - x[0] * y[2]
@@ -135,7 +136,7 @@ def cross_into(x, y, out):
 
 
 @compiled
-def shorten(x, length_max):
+def shorten(x: Vector, length_max: float) -> None:
     """Scale a vector in place to a largest length."""
     length = math.sqrt(dot(x, x))
     if length > length_max:

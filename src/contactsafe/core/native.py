@@ -13,6 +13,7 @@ import mujoco
 from numba import carray, types
 from numba.extending import intrinsic
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import UnsupportedVersionError
 
@@ -81,12 +82,12 @@ def _pointer(typing_context, address):
 
 
 @compiled(inline="always")
-def view1(address, n):
+def view1(address: int, n: int) -> Vector:
     """See n float64 at an address as an array, (n,)."""
     return carray(_pointer(address), (n,))
 
 
 @compiled(inline="always")
-def view2(address, rows, columns):
+def view2(address: int, rows: int, columns: int) -> Matrix:
     """See rows × columns float64 at an address as a row-major array, (rows, columns)."""
     return carray(_pointer(address), (rows, columns))

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 
 
 @compiled
-def quat_to_matrix(quat):
+def quat_to_matrix(quat: Vector) -> Matrix:
     """Turn a unit quaternion w x y z, (4,), into a rotation matrix, (3, 3)."""
     w, x, y, z = quat[0], quat[1], quat[2], quat[3]
     R = np.empty((3, 3))
@@ -25,7 +26,7 @@ def quat_to_matrix(quat):
 
 
 @compiled
-def matrix_to_quat(R):
+def matrix_to_quat(R: Matrix) -> Vector:
     """Turn a rotation matrix, (3, 3), into a unit quaternion w x y z with w ≥ 0, (4,).
 
     Picks the largest component first, so it is accurate at every angle (Shepperd 1978).
@@ -34,7 +35,7 @@ def matrix_to_quat(R):
 
 
 @compiled
-def matrix_to_quat_into(R, quat):
+def matrix_to_quat_into(R: Matrix, quat: Vector) -> Vector:
     """Write the quaternion of `matrix_to_quat` to `quat`, (4,), and give it back."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace > 0.0:
@@ -63,7 +64,7 @@ def matrix_to_quat_into(R, quat):
 
 
 @compiled
-def quat_multiply(a, b):
+def quat_multiply(a: Vector, b: Vector) -> Vector:
     """Give the Hamilton product a b, (4,)."""
     out = np.empty(4)
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -74,7 +75,7 @@ def quat_multiply(a, b):
 
 
 @compiled
-def quat_to_rotvec(quat):
+def quat_to_rotvec(quat: Vector) -> Vector:
     """Give the rotation vector of a unit quaternion, the shortest way round, (3,), rad."""
     out = np.empty(3)
     sign = 1.0 if quat[0] >= 0.0 else -1.0
@@ -88,7 +89,7 @@ def quat_to_rotvec(quat):
 
 
 @compiled
-def rotvec_to_quat(rotvec):
+def rotvec_to_quat(rotvec: Vector) -> Vector:
     """Give the unit quaternion of a rotation vector, (3,) rad to (4,)."""
     out = np.empty(4)
     angle = math.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
@@ -102,7 +103,7 @@ def rotvec_to_quat(rotvec):
 
 
 @compiled
-def orientation_error(quat_d, R):
+def orientation_error(quat_d: Vector, R: Matrix) -> Vector:
     """Give the rotation vector of R_d Rᵀ in world axes, (3,), rad.
 
     Args:

@@ -4,6 +4,8 @@ Such an array is gone when the function that made it returns. It may be handed d
 but never out; and it is made at the top of a function, not in a loop, where each turn would take up more of the stack.
 """
 
+from typing import Any
+
 from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -23,7 +25,7 @@ def _array_on_stack(context, builder, array, shape):
 
 
 @intrinsic
-def stack_vector(typing_context, n):
+def stack_vector(typing_context: Any, n: Any) -> Any:
     """Make n float64 for the time of the calling function, uninitialised, (n,)."""
     array = types.Array(types.float64, 1, "C")
 
@@ -34,7 +36,7 @@ def stack_vector(typing_context, n):
 
 
 @intrinsic
-def stack_matrix(typing_context, rows, columns):
+def stack_matrix(typing_context: Any, rows: Any, columns: Any) -> Any:
     """Make rows × columns float64 for the time of the calling function, uninitialised, (rows, columns)."""
     array = types.Array(types.float64, 2, "C")
 

@@ -8,7 +8,8 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.rotation import rotvec_to_quat
-from contactsafe.experiments.collision_scenes import sample_obstacle, sample_plant, scene_rng
+from contactsafe.experiments.collision_motions import sample_plant, scene_rng
+from contactsafe.experiments.collision_scenes import sample_obstacle
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric

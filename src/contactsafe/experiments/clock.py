@@ -12,7 +12,7 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.experiments.clock_cases import CASES, SITUATIONS, Case, Scene, heading, sample_scene
 from contactsafe.experiments.clock_tables import clock_tables
-from contactsafe.experiments.collision_scenes import scene_rng
+from contactsafe.experiments.collision_motions import scene_rng
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.late_worlds import SEEN, LatePlayback, LateWorlds
 from contactsafe.results.experiment import Experiment, Trial

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.control import presets
-from contactsafe.experiments.collision_scenes import Motion, sample_meetings, sample_motion
+from contactsafe.experiments.collision_motions import Motion, sample_motion
+from contactsafe.experiments.collision_scenes import sample_meetings
 from contactsafe.experiments.late_worlds import (
     FROZEN,
     LOST,

@@ -42,7 +42,7 @@ class ExperimentConfig:
     task: ExperimentTask | None = None
     bundle: Bundle | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse unknown controllers and empty experiments."""
         if not self.controllers:
             raise InvalidInputError(f"no controller given; choose from {', '.join(presets.PRESETS)}")

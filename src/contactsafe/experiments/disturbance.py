@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactsafe.experiments.collision_scenes import sample_plant, scene_rng
+from contactsafe.experiments.collision_motions import sample_plant, scene_rng
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.run import Run, run_policy, steps_in
 from contactsafe.experiments.task import ExperimentTask

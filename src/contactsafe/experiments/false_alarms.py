@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.control import codes
 from contactsafe.control.config import ControllerConfig
-from contactsafe.experiments.collision_scenes import Motion, sample_motion
+from contactsafe.experiments.collision_motions import Motion, sample_motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.results.experiment import Trial
 from contactsafe.robot.arm import Arm

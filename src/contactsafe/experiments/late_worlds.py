@@ -7,7 +7,7 @@ import numpy as np
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.tick import control_tick
 from contactsafe.core.compiled import compiled
-from contactsafe.experiments.collision_scenes import Motion
+from contactsafe.experiments.collision_motions import Motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.robot.arm import Arm
 from contactsafe.sim import mujoco_backend

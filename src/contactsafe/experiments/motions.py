@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactsafe.core.copying import Independent
-from contactsafe.experiments.collision_scenes import TARGET_OFFSET_MAX_M, Motion
+from contactsafe.experiments.collision_motions import TARGET_OFFSET_MAX_M, Motion
 from contactsafe.robot.ik import solve_ik
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds, ticks_of_step

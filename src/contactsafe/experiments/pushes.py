@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.control.codes import FREE
 from contactsafe.control.config import ControllerConfig
-from contactsafe.experiments.collision_scenes import sample_motion, scene_rng
+from contactsafe.experiments.collision_motions import sample_motion, scene_rng
 from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.surfaces import clearance, description_and_tool, sample_surface_point
 from contactsafe.results.experiment import Trial

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.rotation import matrix_to_quat, quat_multiply, quat_to_rotvec, rotvec_to_quat
-from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture
+from contactsafe.policy.action_config import ActionLimits
+from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, PostureRule, find_posture
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 """Orientation of a tool that points straight down, w x y z."""
@@ -13,13 +15,13 @@ _UNDO_DOWN = np.array([0.0, -1.0, 0.0, 0.0])
 
 
 @compiled
-def rotation_from_down(quat):
+def rotation_from_down(quat: Vector) -> Vector:
     """Return the rotation vector, world axes, that turns straight down into an orientation, (3,), rad."""
     return quat_to_rotvec(quat_multiply(quat, _UNDO_DOWN))
 
 
 @compiled(nogil=True)
-def apply_action(c, limits, rule, action):
+def apply_action(c: Record, limits: ActionLimits, rule: PostureRule, action: Vector) -> None:
     """Move the target of a `controller_dtype` record by one action.
 
     x_d is never farther from the tool than `offset_max`, nor outside its bounds; the posture is the one
@@ -54,7 +56,7 @@ def apply_action(c, limits, rule, action):
 
 
 @compiled
-def observed_pose(c, out):
+def observed_pose(c: Record, out: Vector) -> None:
     """Fill tool position, m, and rotation vector from straight down, rad, as measured, (6,)."""
     rotvec = rotation_from_down(matrix_to_quat(c.output.rotation))
     for i in range(3):
@@ -63,7 +65,7 @@ def observed_pose(c, out):
 
 
 @compiled
-def observed_target(c, pose, out):
+def observed_target(c: Record, pose: Vector, out: Vector) -> None:
     """Fill x_d less the observed pose, m and rad, then K1, 1/s², and D1, 1/s, (18,)."""
     rotvec = rotation_from_down(c.target.quat)
     for i in range(3):
@@ -74,7 +76,9 @@ def observed_target(c, pose, out):
 
 
 @compiled(nogil=True)
-def act(start, stop, controllers, limits, rule, actions):
+def act(
+    start: int, stop: int, controllers: np.ndarray, limits: ActionLimits, rule: PostureRule, actions: Matrix
+) -> None:
     """Move the targets of the controllers from start to stop by their actions; see `apply_action`."""
     for i in range(start, stop):
         apply_action(controllers[i], limits, rule, actions[i])

@@ -4,7 +4,7 @@
 `Backend` takes the same record from Python. Sensors, controller, metrics and tasks do not tell one from the other.
 """
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -37,8 +37,29 @@ class Backend(Protocol):
         """Release what the engine holds."""
 
 
-def run_backend(backend: Backend, i: int, worlds, controllers, noise, ticks, metrics, samples, traces) -> None:
-    """Run ticks[i] ticks of world i in a backend; the arrays are those of `run_worlds`."""
+class StepArrays(NamedTuple):
+    """What a step of n worlds reads and writes, in the order of `run_worlds`.
+
+    Attributes:
+        worlds, controllers: `world_dtype` and `controller_dtype` records, (n,).
+        noise: standard normal numbers, (n, at least ticks, `noise_channels`).
+        ticks: how many each world runs, (n,).
+        metrics: `step_metrics_dtype` records, (n,).
+        samples, traces: `sample_dtype` and `trace_dtype` records, (n, at least ticks); traces may be (n, 0).
+    """
+
+    worlds: np.ndarray
+    controllers: np.ndarray
+    noise: np.ndarray
+    ticks: np.ndarray
+    metrics: np.ndarray
+    samples: np.ndarray
+    traces: np.ndarray
+
+
+def run_backend(backend: Backend, i: int, arrays: StepArrays) -> None:
+    """Run ticks[i] ticks of world i in a backend."""
+    worlds, controllers, noise, ticks, metrics, samples, traces = arrays
     world = worlds[i]
     _begin_step(metrics, i, ticks)
     for k in range(ticks[i]):

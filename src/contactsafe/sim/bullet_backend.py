@@ -144,7 +144,7 @@ class BulletBackend(Unique):
         self._torque = np.zeros(arm.n)
         self.reset(arm.home)
 
-    def reset(self, q) -> None:
+    def reset(self, q: np.ndarray) -> None:
         """Put the arm at rest at q (n,) rad, in a world built anew."""
         bullet, client = self._bullet, self._client
         bullet.resetSimulation(physicsClientId=client)

@@ -28,7 +28,7 @@ class PlantConfig:
     payload_kg: float = 0.0
     torque_delay_ticks: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a plant that cannot be built."""
         if self.torque_delay_ticks not in (0, 1):
             raise InvalidInputError(f"torque_delay_ticks = {self.torque_delay_ticks}; give 0 or 1")
@@ -107,7 +107,7 @@ class WorldConfig:
     tip: TipSurface = field(default_factory=TipSurface)
     obstacles: tuple[Obstacle, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse more obstacles or fixtures than a world's record has room for."""
         if len(self.obstacles) > MAX_OBSTACLES:
             raise InvalidInputError(f"{len(self.obstacles)} obstacles asked for; a world holds at most {MAX_OBSTACLES}")

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross, matvec
 from contactsafe.core.native import mj_jac, mj_kinematics, mj_step, view1, view2
 
 
 @compiled(nogil=True)
-def read(world):
+def read(world: Record) -> None:
     """Fill the truth of a `world_dtype` record from MuJoCo's arrays.
 
     After a step positions and velocities are new, and sensors and frames are those of its beginning.
@@ -50,7 +51,7 @@ def _read_fixtures(plant, truth, data):
 
 
 @compiled(nogil=True)
-def write(world):
+def write(world: Record) -> None:
     """Put the torques of motors, friction and a push on the joints; move the obstacles that travel."""
     plant = world.plant
     n = world.motor.shape[0]
@@ -97,7 +98,7 @@ def _move_obstacles(world):
 
 
 @compiled(nogil=True)
-def mirror(world):
+def mirror(world: Record) -> None:
     """Bring MuJoCo's geometry to where another backend has the arm, for pictures."""
     n = world.truth.q.shape[0]
     view1(world.plant.qpos, n)[:] = world.truth.q
@@ -105,6 +106,6 @@ def mirror(world):
 
 
 @compiled(nogil=True)
-def step(world):
+def step(world: Record) -> None:
     """Advance by one tick."""
     mj_step(world.plant.model, world.plant.data)

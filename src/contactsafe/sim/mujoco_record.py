@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.robot.mjcf import TOOL_SITE
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import MAX_FIXTURES
@@ -39,7 +40,7 @@ mujoco_dtype = np.dtype(
 """Addresses of one plant, and how its obstacles travel."""
 
 
-def point_plant(plant, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def point_plant(plant: Record, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Tell a `mujoco_dtype` record where model and data lie; the caller keeps them alive."""
     plant["model"], plant["data"] = model._address, data._address
     for name in VIEWED:
@@ -47,7 +48,7 @@ def point_plant(plant, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     plant["qpos_spring"] = model.qpos_spring.ctypes.data
 
 
-def fill_plant(plant, model: mujoco.MjModel, config: WorldConfig) -> None:
+def fill_plant(plant: Record, model: mujoco.MjModel, config: WorldConfig) -> None:
     """Fill a `mujoco_dtype` record but for what `point_plant` does."""
     for name in _COUNTS:
         plant[name] = getattr(model, name)

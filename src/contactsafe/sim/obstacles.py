@@ -44,7 +44,7 @@ class Obstacle:
         """Whether it cannot move."""
         return math.isinf(self.stiffness)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse what MuJoCo would hardly feel (its contact stiffness scales with mass) or cannot build."""
         if self.mass < 0.1:
             raise InvalidInputError(

@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.sim.mujoco_record import mujoco_dtype
 from contactsafe.sim.sensing import errors_dtype
@@ -58,7 +59,7 @@ def world_bounds(bodies: int) -> dict[str, tuple[float, float]]:
 
 
 @compiled
-def push_fraction(world):
+def push_fraction(world: Record) -> float:
     """Compute how much of its push a world's arm feels at this tick, 0 … 1."""
     push = world.push
     if push.body == 0 or world.tick < push.start or world.tick >= push.stop:

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from contactsafe.control.laws import filter_gain
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.linalg import cross_into, matvec_into
@@ -53,7 +54,7 @@ def errors_dtype(n: int) -> np.dtype:
     )
 
 
-def fill_errors(errors, arm: Arm, config: WorldConfig, tick_s: float) -> None:
+def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) -> None:
     """Fill an `errors_dtype` record.
 
     Raises:
@@ -76,7 +77,7 @@ def fill_errors(errors, arm: Arm, config: WorldConfig, tick_s: float) -> None:
 
 
 @compiled
-def sense(world, controller, noise):
+def sense(world: Record, controller: Record, noise: Vector) -> None:
     """Fill the controller's measurement from the truth, with errors.
 
     Args:
@@ -123,7 +124,7 @@ def _sense_wrench(errors, truth, rotation, measurement, noise):
 
 
 @compiled
-def actuate(world, controller, noise):
+def actuate(world: Record, controller: Record, noise: Vector) -> None:
     """Fill what motors and friction put on the joints for a command: delay, torque noise, friction.
 
     Args:

@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
+
 from contactsafe.control.tick import control_tick
+from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
@@ -12,7 +15,15 @@ from contactsafe.sim.sensing import actuate, sense
 
 
 @compiled(nogil=True)
-def run_ticks(world, controller, noise, ticks, metrics, samples, trace):
+def run_ticks(
+    world: Record,
+    controller: Record,
+    noise: Matrix,
+    ticks: int,
+    metrics: Record,
+    samples: np.ndarray,
+    trace: np.ndarray,
+) -> None:
     """Run a number of control ticks of one world in MuJoCo.
 
     Args:
@@ -35,7 +46,7 @@ def run_ticks(world, controller, noise, ticks, metrics, samples, trace):
 
 
 @compiled
-def begin_step(metrics, ticks):
+def begin_step(metrics: Record, ticks: int) -> None:
     """Begin the metrics of a step of so many ticks."""
     metrics.tool_force_mean, metrics.tool_force_peak, metrics.contact_ticks = 0.0, 0.0, 0
     metrics.obstacle_force_peak, metrics.arm_touched = 0.0, 0
@@ -43,13 +54,13 @@ def begin_step(metrics, ticks):
 
 
 @compiled
-def end_step(metrics):
+def end_step(metrics: Record) -> None:
     """Finish them."""
     metrics.tool_force_mean /= metrics.ticks
 
 
 @compiled
-def begin_tick(world, controller, noise):
+def begin_tick(world: Record, controller: Record, noise: Vector) -> None:
     """Sense, control, drive."""
     sense(world, controller, noise)
     control_tick(controller)
@@ -57,14 +68,16 @@ def begin_tick(world, controller, noise):
 
 
 @compiled
-def drive(world, controller, noise):
+def drive(world: Record, controller: Record, noise: Vector) -> None:
     """Fill the torques that the backend is to write, and how much of the push is on."""
     actuate(world, controller, noise)
     world.push.fraction = push_fraction(world)
 
 
 @compiled
-def end_tick(world, controller, metrics, samples, trace, k):
+def end_tick(
+    world: Record, controller: Record, metrics: Record, samples: np.ndarray, trace: np.ndarray, k: int
+) -> None:
     """Measure what the k-th tick brought, and write it down; the truth is what the backend read after it."""
     truth, sample = world.truth, samples[k]
     sample.position[:], sample.rotation[:] = truth.position, truth.rotation

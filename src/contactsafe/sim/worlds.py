@@ -6,6 +6,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
@@ -18,7 +19,7 @@ from contactsafe.core.state import Entry, load_state_dict, of_generators, of_rec
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim import mujoco_backend
-from contactsafe.sim.backend import Backend, run_backend
+from contactsafe.sim.backend import Backend, StepArrays, run_backend
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.mujoco_record import fill_plant, point_plant
 from contactsafe.sim.record import world_bounds, world_dtype
@@ -43,7 +44,10 @@ def ticks_of_step(step: int) -> int:
 
 
 @compiled(nogil=True)
-def run_worlds(start, stop, worlds, controllers, noise, ticks, metrics, samples, traces):
+def run_worlds(
+    start: int, stop: int, worlds: np.ndarray, controllers: np.ndarray, noise: np.ndarray, ticks: np.ndarray,
+    metrics: np.ndarray, samples: np.ndarray, traces: np.ndarray,
+) -> None:  # fmt: skip
     """Run ticks[i] ticks of each world from start to stop; see `run_ticks`."""
     for i in range(start, stop):
         run_ticks(worlds[i], controllers[i], noise[i], ticks[i], metrics[i], samples[i], traces[i])
@@ -174,7 +178,7 @@ class Worlds(Independent):
             streams = [np.random.SeedSequence(one) for one in seed]
         self.rngs = [np.random.Generator(np.random.SFC64(stream)) for stream in streams]
 
-    def reset(self, i: int, q) -> None:
+    def reset(self, i: int, q: ArrayLike) -> None:
         """Put world i's arm at rest at q (n,) rad, with a new sensor bias."""
         q = self.arm.joint_vector(q, "q")
         model, data, record = self.models[i], self.datas[i], self.records[i]
@@ -197,7 +201,7 @@ class Worlds(Independent):
         else:
             _read_one(self.records, i)
 
-    def place(self, i: int, q) -> None:
+    def place(self, i: int, q: ArrayLike) -> None:
         """Put world i's arm at q (n,) rad for a picture: nothing but the places of its shapes is brought up to date."""
         self.datas[i].qpos[: self.arm.n] = self.arm.joint_vector(q, "q")
         mujoco.mj_kinematics(self.models[i], self.datas[i])
@@ -237,7 +241,7 @@ class Worlds(Independent):
             rng.standard_normal(out=noise)
         return self._noise
 
-    def in_threads(self, run) -> None:
+    def in_threads(self, run: Callable[[int, int], None]) -> None:
         """Call run(start, stop) on consecutive ranges of worlds, one a thread; raise what they raise."""
         if self.n == 1 or self.backends:
             run(0, self.n)
@@ -247,7 +251,7 @@ class Worlds(Independent):
         for future in [self._threads.submit(run, bounds[k], bounds[k + 1]) for k in range(workers)]:
             future.result()
 
-    def run(self, ticks, trace: np.ndarray | None = None) -> None:
+    def run(self, ticks: int | np.ndarray, trace: np.ndarray | None = None) -> None:
         """Run control ticks in every world.
 
         Args:
@@ -264,15 +268,15 @@ class Worlds(Independent):
         """Run the worlds from start to stop, in the calling thread; `ticks` (n,) and `trace` are sound."""
         noise = self.sample_noise(start, stop)
         traces = self.no_trace if trace is None else trace
-        records = (self.records, self.controllers, noise, ticks, self.metrics, self.samples, traces)
+        arrays = StepArrays(self.records, self.controllers, noise, ticks, self.metrics, self.samples, traces)
         if not self.backends:
-            run_worlds(start, stop, *records)
+            run_worlds(start, stop, *arrays)
             return
         for i in range(start, stop):
-            run_backend(self.backends[i], i, *records)
+            run_backend(self.backends[i], i, arrays)
             _mirror_one(self.records, i)
 
-    def _checked(self, ticks, trace: np.ndarray | None) -> np.ndarray:
+    def _checked(self, ticks: int | np.ndarray, trace: np.ndarray | None) -> np.ndarray:
         """Return the ticks of each world, (n,), after checking them and the trace."""
         ticks = np.broadcast_to(np.asarray(ticks, dtype=np.int64), (self.n,))
         most = int(ticks.max())
@@ -282,7 +286,7 @@ class Worlds(Independent):
             raise InvalidInputError(f"trace has shape {trace.shape}; give ({self.n}, {most}) or more")
         return ticks
 
-    def place_fixture(self, i: int, name: str, position, quat) -> None:
+    def place_fixture(self, i: int, name: str, position: ArrayLike, quat: ArrayLike) -> None:
         """Put a fixture of world i elsewhere; its worlds must not share their models. Reset the world next.
 
         Args:
@@ -302,7 +306,9 @@ class Worlds(Independent):
         if self.backends:
             self.backends[i].set_tip_friction(friction)
 
-    def push(self, i: int, body: str, point, force, start_s: float, stop_s: float, ramp_s: float = 0.02) -> None:
+    def push(
+        self, i: int, body: str, point: ArrayLike, force: ArrayLike, start_s: float, stop_s: float, ramp_s: float = 0.02
+    ) -> None:
         """Push a link of world i.
 
         Args:

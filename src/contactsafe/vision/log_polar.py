@@ -7,13 +7,17 @@ outright. Nothing here is learned.
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.byte_scan import places_unlike
 from contactsafe.core.compiled import compiled
+from contactsafe.core.copying import Threads
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.vision.checks import checked_homography, checked_tools
 from contactsafe.vision.rectify import INK_BELOW
 
 RINGS = 10
@@ -49,7 +53,7 @@ class Ground(NamedTuple):
     area: np.ndarray
 
 
-def ground_of(homography, size):
+def ground_of(homography: ArrayLike | None, size: Sequence[int]) -> Ground:
     """Find where the pixels of a camera look at.
 
     Args:
@@ -63,26 +67,22 @@ def ground_of(homography, size):
     Raises:
         InvalidInputError: the homography is not finite (3, 3), or cannot be inverted.
     """
-    H = np.asarray(homography, dtype=np.float64)
-    if H.shape != (3, 3) or not np.isfinite(H).all():
-        raise InvalidInputError(f"homography has shape {H.shape}; give a finite (3, 3) matrix")
-    norm = np.linalg.norm(H)
-    if norm == 0.0 or abs(np.linalg.det(H / norm)) < 1e-15:
-        raise InvalidInputError("homography is singular: the camera would see the board edge-on; check its calibration")
-    inverse = np.linalg.inv(H)
+    inverse = np.linalg.inv(checked_homography(homography))
     v, u = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5, indexing="ij")
     x, y, w = np.einsum("ij,jkl->ikl", inverse, np.stack([u, v, np.ones_like(u)]))
     side = np.sign(w[size[0] // 2, size[1] // 2])
-    ahead = side * w > 1e-9
-    w = np.where(ahead, w, 1.0)
+    visible = side * w > 1e-9
+    w = np.where(visible, w, 1.0)
     # The area that a homography maps to one pixel: |det H⁻¹| / |w|³.
-    area = np.where(ahead, abs(np.linalg.det(inverse)) / np.abs(w) ** 3, 0.0)
+    area = np.where(visible, abs(np.linalg.det(inverse)) / np.abs(w) ** 3, 0.0)
     place = np.stack([x / w, y / w], axis=-1)
     return Ground(place.reshape(-1, 2), np.ascontiguousarray(area.reshape(-1)))
 
 
-def log_polar_features(masks, tool_positions, ground, threads=None):
-    """Say where ink is as seen from each tool.
+def log_polar_features(
+    masks: ArrayLike, tool_positions: ArrayLike, ground: Ground, threads: Threads | None = None
+) -> np.ndarray:
+    """Compute where ink is as seen from each tool.
 
     Features, in this order: log-amount of ink in each of RINGS × SECTORS cells about the tool, rings evenly spaced in
     the logarithm of distance, sectors from world x towards y, each pixel spread over the cells about it; for each
@@ -109,25 +109,21 @@ def log_polar_features(masks, tool_positions, ground, threads=None):
         raise InvalidInputError(
             f"masks are {masks.dtype} of shape {masks.shape}; give uint8 of {len(ground.area)} pixels each"
         )
-    tool_xy = np.asarray(tool_positions, dtype=np.float64)
-    if tool_xy.ndim != 2 or len(tool_xy) != len(masks) or tool_xy.shape[1] < 2:
-        raise InvalidInputError(
-            f"tool_positions have shape {tool_xy.shape}; give one row of x, y for each of {len(masks)} masks"
-        )
+    tool_xy = checked_tools(tool_positions, len(masks))
     features = np.zeros((len(masks), FEATURES), dtype=np.float32)
     flat = np.ascontiguousarray(masks).reshape(len(masks), -1)
-    tool_xy = np.ascontiguousarray(tool_xy[:, :2])
+    arrays = (flat, tool_xy, ground.place, ground.area, features)
     if threads is None:
-        _fill_features(0, len(masks), flat, tool_xy, ground.place, ground.area, features)
-        return features
-    bounds = np.linspace(0, len(masks), min(len(masks), CHUNKS) + 1).astype(int).tolist()
-    chunks = [
-        threads.submit(_fill_features, start, stop, flat, tool_xy, ground.place, ground.area, features)
-        for start, stop in itertools.pairwise(bounds)
-    ]
-    for chunk in chunks:
-        chunk.result()
+        _fill_features(0, len(masks), *arrays)
+    else:
+        _fill_in_threads(threads, len(masks), arrays)
     return features
+
+
+def _fill_in_threads(threads: Threads, count: int, arrays: tuple[np.ndarray, ...]) -> None:
+    bounds = np.linspace(0, count, min(count, CHUNKS) + 1).astype(int).tolist()
+    for chunk in [threads.submit(_fill_features, start, stop, *arrays) for start, stop in itertools.pairwise(bounds)]:
+        chunk.result()
 
 
 @compiled(nogil=True)
@@ -139,17 +135,8 @@ def _fill_features(start, stop, masks, tool_xy, place, area, features):
 
 @compiled(nogil=True)
 def _fill_features_of(mask, tool_x, tool_y, place, area, out):
-    dark = np.empty(mask.shape[0], dtype=np.int32)
-    pixels = dark[: places_unlike(mask, np.uint8(255), dark)]
-    count, near = 0, 0
-    nearest = math.inf
-    for p in pixels:
-        if mask[p] < INK_BELOW and area[p] > 0.0:
-            pixels[count] = p
-            count += 1
-            distance = (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2
-            if distance < nearest:
-                near, nearest = p, distance
+    pixels = np.empty(mask.shape[0], dtype=np.int32)
+    count, near = _list_ink(mask, tool_x, tool_y, place, area, pixels)
     if count == 0:
         return
     grid, patches, total = np.zeros((RINGS, SECTORS)), np.zeros((len(SCALES_M), 3)), 0.0
@@ -165,6 +152,20 @@ def _fill_features_of(mask, tool_x, tool_y, place, area, out):
             patches[k, 1] += weight * dy
             patches[k, 2] += weight
     _write(grid, patches, total, out)
+
+
+@compiled(nogil=True)
+def _list_ink(mask, tool_x, tool_y, place, area, pixels):
+    """List the pixels that are ink on the board; return how many, and the one nearest to the tool."""
+    count, near, nearest = 0, 0, math.inf
+    for p in pixels[: places_unlike(mask, np.uint8(255), pixels)]:
+        if mask[p] < INK_BELOW and area[p] > 0.0:
+            pixels[count] = p
+            count += 1
+            distance = (place[p, 0] - tool_x) ** 2 + (place[p, 1] - tool_y) ** 2
+            if distance < nearest:
+                near, nearest = p, distance
+    return count, near
 
 
 @compiled(nogil=True)

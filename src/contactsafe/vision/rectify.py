@@ -8,9 +8,11 @@ the camera's own frame it hardly does.
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.vision.checks import checked_homography, checked_tools
 
 INK_BELOW = 128
 """A camera pixel darker than this is ink; masks hold 0 and 255 only."""
@@ -22,7 +24,13 @@ SIZE = 128
 """Cells along a side of the view; 5 mm each with the default window."""
 
 
-def rectify(masks, tool_positions, homography, window_m=WINDOW_M, size=SIZE):
+def rectify(
+    masks: ArrayLike,
+    tool_positions: ArrayLike,
+    homography: ArrayLike | None,
+    window_m: float = WINDOW_M,
+    size: int = SIZE,
+) -> np.ndarray:
     """Show each camera mask in a board-aligned window centred on its tool.
 
     Cell (row, column) covers a square of window_m / size; columns run along world x and rows along world y:
@@ -39,11 +47,22 @@ def rectify(masks, tool_positions, homography, window_m=WINDOW_M, size=SIZE):
         size: cells along a side.
 
     Returns:
-        Views, (N, size, size), uint8: 0 is ink, 255 is no ink or out of the camera's sight.
+        Views, (N, size, size), uint8: 0 is ink, 255 is no ink or out of the camera's view.
 
     Raises:
         InvalidInputError: a shape or type differs from the above, or the homography cannot be inverted.
     """
+    masks = _checked_masks(masks)
+    tool_xy, H = checked_tools(tool_positions, len(masks)), checked_homography(homography)
+    if not (window_m > 0.0 and size > 0):
+        raise InvalidInputError(f"window_m = {window_m} m and size = {size}; both have to be above 0")
+    views = np.empty((masks.shape[0], size, size), dtype=np.uint8)
+    _rectify(masks, tool_xy, H, np.linalg.inv(H), float(window_m), views)
+    return views
+
+
+def _checked_masks(masks: ArrayLike) -> np.ndarray:
+    """Return the masks without a channel, (N, height, width)."""
     masks = np.asarray(masks)
     if masks.ndim == 4 and masks.shape[3] == 1:
         masks = masks[..., 0]
@@ -51,29 +70,7 @@ def rectify(masks, tool_positions, homography, window_m=WINDOW_M, size=SIZE):
         raise InvalidInputError(
             f"masks are {masks.dtype} of shape {masks.shape}; give uint8 of shape (N, height, width)"
         )
-    tool_xy = np.asarray(tool_positions, dtype=np.float64)
-    if tool_xy.ndim != 2 or tool_xy.shape[0] != masks.shape[0] or tool_xy.shape[1] < 2:
-        raise InvalidInputError(
-            f"tool_positions have shape {tool_xy.shape}; give one row of x, y for each of {masks.shape[0]} masks"
-        )
-    homography = np.ascontiguousarray(homography, dtype=np.float64)
-    if homography.shape != (3, 3) or not np.all(np.isfinite(homography)):
-        raise InvalidInputError(f"homography has shape {homography.shape}; give a finite (3, 3) matrix")
-    if not (window_m > 0.0 and size > 0):
-        raise InvalidInputError(f"window_m = {window_m} m and size = {size}; both have to be above 0")
-    norm = np.linalg.norm(homography)
-    if norm == 0.0 or abs(np.linalg.det(homography / norm)) < 1e-15:
-        raise InvalidInputError("homography is singular: the camera would see the board edge-on; check its calibration")
-    views = np.empty((masks.shape[0], size, size), dtype=np.uint8)
-    _rectify(
-        np.ascontiguousarray(masks),
-        np.ascontiguousarray(tool_xy[:, :2]),
-        homography,
-        np.linalg.inv(homography),
-        float(window_m),
-        views,
-    )
-    return views
+    return np.ascontiguousarray(masks)
 
 
 @compiled(nogil=True)
@@ -97,14 +94,21 @@ def _rectify_one(mask, tool_x, tool_y, H, H_inv, window_m, view):
     y0 = tool_y - 0.5 * window_m
     _splat(mask, top, bottom, left, right, H_inv, side, x0, y0, per_m, view)
 
-    # Cells that can see ink lie within the outline of the ink's box on the board.
+    first_row, last_row, first_column, last_column = _cells_that_see(
+        top, bottom, left, right, H_inv, side, x0, y0, per_m, size
+    )
+    _look_up(mask, first_row, last_row, first_column, last_column, H, side, x0, y0, per_m, view)
+
+
+@compiled(nogil=True)
+def _cells_that_see(top, bottom, left, right, H_inv, side, x0, y0, per_m, size):
+    """Find rows and columns of the cells that can see ink: they lie within the outline of its box on the board."""
     low_row, high_row, low_column, high_column = math.inf, -math.inf, math.inf, -math.inf
     for corner in range(4):
         u = float(left if corner % 2 == 0 else right + 1)
         v = float(top if corner < 2 else bottom + 1)
         w = side * (H_inv[2, 0] * u + H_inv[2, 1] * v + H_inv[2, 2])
-        if w <= 1e-12:
-            # The box reaches the horizon: look everywhere.
+        if w <= 1e-12:  # the box reaches the horizon: look everywhere
             low_row, high_row, low_column, high_column = 0.0, size, 0.0, size
             break
         column = (side * (H_inv[0, 0] * u + H_inv[0, 1] * v + H_inv[0, 2]) / w - x0) * per_m
@@ -112,8 +116,7 @@ def _rectify_one(mask, tool_x, tool_y, H, H_inv, window_m, view):
         low_row, high_row = min(low_row, row), max(high_row, row)
         low_column, high_column = min(low_column, column), max(high_column, column)
     first_row, last_row = _clamp(low_row - 1.0, size), _clamp(high_row + 2.0, size)
-    first_column, last_column = _clamp(low_column - 1.0, size), _clamp(high_column + 2.0, size)
-    _look_up(mask, first_row, last_row, first_column, last_column, H, side, x0, y0, per_m, view)
+    return first_row, last_row, _clamp(low_column - 1.0, size), _clamp(high_column + 2.0, size)
 
 
 @compiled(nogil=True)

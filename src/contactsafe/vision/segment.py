@@ -1,5 +1,7 @@
 """Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
@@ -10,7 +12,28 @@ INK_PIXEL, OTHER_PIXEL = 0, 255
 
 _COARSE = 4  # photograph's pixels along an edge of one of the background's
 _WINDOW = 5  # of the background's pixels: strokes and blobs must be narrower, shadows wider
-_DEEPEST = 0.20  # share of the board's brightness that is left in the darkest shadow
+_DEEPEST = 0.20  # fraction of the board's brightness that is left in the darkest shadow
+
+
+@dataclass(frozen=True)
+class InkThresholds:
+    """What counts as ink.
+
+    Attributes:
+        faint: a pixel this fraction darker than the board is ink if it hangs together with ink.
+        clear: a pixel this fraction darker than the board is ink where its surroundings are sharp.
+        sharp: change of brightness from one pixel to those around it, as a fraction of the board's.
+        least_px: of the photograph's pixels, the fewest that make a speck.
+        covered: fraction of a mask's pixel, covered by ink, that marks it.
+        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
+    """
+
+    faint: float = 0.15
+    clear: float = 0.20
+    sharp: float = 0.12
+    least_px: int = 3
+    covered: float = 0.10
+    rim_px: int = 3
 
 
 class Segmenter:
@@ -25,12 +48,7 @@ class Segmenter:
         corners: of the board, x and y in turn around it, (4, 2), m.
         photo_size: pixels along an edge of the photograph.
         mask_size: pixels along an edge of the mask.
-        faint: a pixel this share darker than the board is ink if it hangs together with ink.
-        clear: a pixel this share darker than the board is ink where its surroundings are sharp.
-        sharp: change of brightness from one pixel to those around it, share of the board's.
-        least_px: of the photograph's pixels, the fewest that make a speck.
-        share: of a mask's pixel, covered by ink, that marks it.
-        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
+        ink: thresholds of brightness and size.
 
     Raises:
         InvalidInputError: a size below 8 pixels, a homography that is not finite, a board out of sight.
@@ -42,12 +60,7 @@ class Segmenter:
         corners: np.ndarray,
         photo_size: int = 455,
         mask_size: int = 128,
-        faint: float = 0.15,
-        clear: float = 0.20,
-        sharp: float = 0.12,
-        least_px: int = 3,
-        share: float = 0.10,
-        rim_px: int = 3,
+        ink: InkThresholds = InkThresholds(),
     ):
         homography, corners = np.asarray(homography, dtype=float), np.asarray(corners, dtype=float)
         if homography.shape != (3, 3) or not np.isfinite(homography).all() or corners.shape != (4, 2):
@@ -57,12 +70,9 @@ class Segmenter:
         if min(photo_size, mask_size) < 8:
             raise InvalidInputError(f"photo_size = {photo_size}, mask_size = {mask_size}; give 8 or more pixels")
         self.photo_size, self.mask_size = photo_size, mask_size
-        self.faint, self.clear, self.sharp, self.least_px, self.share = faint, clear, sharp, least_px, share
-        board = np.zeros((photo_size, photo_size), np.uint8)
-        depths = corners @ homography[2, :2] + homography[2, 2]
-        if (depths > 0).all() or (depths < 0).all():
-            fill(board, np.clip(on_plane(corners, homography), -1e4, 1e4), 255)
-        self._rim = np.ones((2 * rim_px + 1,) * 2, np.uint8)
+        self.ink = ink
+        self._rim = np.ones((2 * ink.rim_px + 1,) * 2, np.uint8)
+        board = _board_seen(homography, corners, photo_size)
         self._board = cv2.erode(board, self._rim, borderType=cv2.BORDER_REPLICATE)
         left, top, width, height = cv2.boundingRect(self._board)
         if width == 0:
@@ -90,36 +100,49 @@ class Segmenter:
         photo = np.asarray(photo)
         if photo.dtype != np.uint8 or photo.shape not in ((n, n), (n, n, 3)):
             raise InvalidInputError(f"photo is {photo.dtype} of shape {photo.shape}; give uint8 ({n}, {n}, 3)")
-        seen = self._board[self._window]
-        if hidden is not None:
-            if hidden.dtype != np.uint8 or hidden.shape != (n, n):
-                raise InvalidInputError(f"hidden is {hidden.dtype} of shape {hidden.shape}; give uint8 ({n}, {n})")
-            seen = cv2.bitwise_and(seen, cv2.bitwise_not(cv2.dilate(hidden[self._window], self._rim)))
+        seen = self._board[self._window] if hidden is None else self._not_hidden(hidden)
         ink = np.zeros((n, n), np.uint8)
         if seen.any():
             darkest = _darkest(photo[self._window], seen)
             evened = cv2.divide(darkest, _background(darkest, seen), scale=_BRIGHT)
             ink[self._window] = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
         covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
-        return np.where(covered > 255 * self.share, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
+        return np.where(covered > 255 * self.ink.covered, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
+
+    def _not_hidden(self, hidden: np.ndarray) -> np.ndarray:
+        """Return where the board is seen beside the arm, uint8."""
+        n = self.photo_size
+        if hidden.dtype != np.uint8 or hidden.shape != (n, n):
+            raise InvalidInputError(f"hidden is {hidden.dtype} of shape {hidden.shape}; give uint8 ({n}, {n})")
+        around_arm = cv2.dilate(hidden[self._window], self._rim)
+        return cv2.bitwise_and(self._board[self._window], cv2.bitwise_not(around_arm))
 
     def _ink(self, evened: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """255 where ink is: specks that hold a clear and sharp pixel, with the faint ones around it, uint8."""
         middle, noise = _middle_and_spread(evened, seen)
-        faint = middle - max(_BRIGHT * self.faint, 4 * noise)
-        clear = middle - max(_BRIGHT * self.clear, 6 * noise)
+        faint = middle - max(_BRIGHT * self.ink.faint, 4 * noise)
+        clear = middle - max(_BRIGHT * self.ink.clear, 6 * noise)
         around = np.ones((3, 3), np.uint8)
-        sharp = cv2.subtract(cv2.dilate(evened, around), cv2.erode(evened, around)) > _BRIGHT * self.sharp
+        sharp = cv2.subtract(cv2.dilate(evened, around), cv2.erode(evened, around)) > _BRIGHT * self.ink.sharp
         candidates = cv2.bitwise_and((evened < faint).view(np.uint8), seen)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]
         kept = np.zeros(count, np.uint8)
         kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
-        kept[stats[:, cv2.CC_STAT_AREA] < self.least_px] = 0
+        kept[stats[:, cv2.CC_STAT_AREA] < self.ink.least_px] = 0
         ink = np.zeros_like(evened)
         ink.ravel()[places] = kept[names]
         return ink
+
+
+def _board_seen(homography: np.ndarray, corners: np.ndarray, size: int) -> np.ndarray:
+    """Draw 255 where the photograph shows the board, 0 elsewhere, uint8 (size, size)."""
+    board = np.zeros((size, size), np.uint8)
+    depths = corners @ homography[2, :2] + homography[2, 2]
+    if (depths > 0).all() or (depths < 0).all():
+        fill(board, np.clip(on_plane(corners, homography), -1e4, 1e4), 255)
+    return board
 
 
 _BRIGHT = 200.0  # what the board's own brightness is evened to: noise above it must not be cut off
@@ -160,10 +183,10 @@ def _histogram(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
     return cv2.calcHist([sample], [0], looked_at, [256], [0, 256]).ravel()
 
 
-def _level(picture: np.ndarray, seen: np.ndarray, share: float) -> int:
-    """Grey level below which this share of what is seen lies."""
+def _level(picture: np.ndarray, seen: np.ndarray, fraction: float) -> int:
+    """Grey level below which this fraction of what is seen lies."""
     counts = np.cumsum(_histogram(picture, seen))
-    return int(np.searchsorted(counts, share * counts[-1]))
+    return int(np.searchsorted(counts, fraction * counts[-1]))
 
 
 def _middle_and_spread(picture: np.ndarray, seen: np.ndarray) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """Where capsules and boxes stand in a picture, from a camera's place or a lamp's: the hulls of their rims."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def on_plane(points: np.ndarray, homography: np.ndarray) -> np.ndarray:
     return seen[..., :2] / seen[..., 2:]
 
 
-def fill(picture: np.ndarray, pixels: np.ndarray, value) -> None:
+def fill(picture: np.ndarray, pixels: np.ndarray, value: float | Sequence[float]) -> None:
     """Fill the hull of points.
 
     Args:

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from tests.tasks.base.observations import drawn, row, same
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.tasks.base.environment import TaskVectorEnv
+from contactsafe.tasks.base.task_vector_env import TaskVectorEnv
 
 IDLE = np.zeros((3, 18), np.float32)
 

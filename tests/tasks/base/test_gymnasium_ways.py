@@ -15,7 +15,8 @@ from tests.tasks.base.observations import drawn, row, same
 import contactsafe  # noqa: F401 -- registers the tasks
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks import task_by_name
-from contactsafe.tasks.base.environment import TaskEnv, TaskVectorEnv
+from contactsafe.tasks.base.task_env import TaskEnv
+from contactsafe.tasks.base.task_vector_env import TaskVectorEnv
 
 IDLE = np.zeros(18, np.float32)
 

@@ -8,7 +8,8 @@ from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.tasks.base.environment import TaskEnv, TaskVectorEnv
+from contactsafe.tasks.base.task_env import TaskEnv
+from contactsafe.tasks.base.task_vector_env import TaskVectorEnv
 from contactsafe.tasks.wiping.config import WipingConfig
 
 NAME = "contactsafe/Wiping-v0"

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from tests.tasks.wiping.tasks_by_script import circle_near_ink, episode, idle, press, wipe_nearest
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.tasks.base.environment import TaskEnv
+from contactsafe.tasks.base.task_env import TaskEnv
 from contactsafe.tasks.wiping.config import RewardConfig, WipingConfig
 from contactsafe.tasks.wiping.step import REWARD_TERMS
 from contactsafe.tasks.wiping.tasks import WipingTasks

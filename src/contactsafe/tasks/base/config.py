@@ -26,7 +26,7 @@ class TaskConfig:
     world: WorldConfig = field(default_factory=WorldConfig)
     action: ActionConfig = field(default_factory=ActionConfig)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a time limit that cannot be."""
         if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
             raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")

@@ -27,7 +27,7 @@ class Pushes:
     pause_s: Range = (0.5, 2.0)
     links: tuple[int, ...] = (3, 4, 5, 6)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse pushes that cannot be."""
         for name in ("force_n", "lasting_s", "pause_s"):
             low, high = getattr(self, name)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.policy.action import observed_pose, observed_target
 
@@ -36,7 +37,7 @@ def task_dtype(reward_terms: Sequence[str], own_fields: Sequence[tuple[Any, ...]
 
 
 @compiled
-def observe_arm(controller, task):
+def observe_arm(controller: Record, task: Record) -> None:
     """Fill what every policy may observe: the tool's pose, where it is told to be and how stiffly, the force.
 
     Args:
@@ -49,7 +50,7 @@ def observe_arm(controller, task):
 
 
 @compiled
-def end_step(metrics, task):
+def end_step(metrics: Record, task: Record) -> None:
     """Count the step and note the forces in it.
 
     Args:
@@ -61,6 +62,6 @@ def end_step(metrics, task):
 
 
 @compiled(nogil=True)
-def observe_one(controllers, tasks, i):
+def observe_one(controllers: np.ndarray, tasks: np.ndarray, i: int) -> None:
     """Run `observe_arm` on one of an array of records."""
     observe_arm(controllers[i], tasks[i])

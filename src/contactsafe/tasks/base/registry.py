@@ -29,9 +29,11 @@ def register_task(name: str, place: str) -> None:
     """
     TASKS[name] = place
     if env_id(name) not in gymnasium.registry:
-        at = "contactsafe.tasks.base.environment:Task"
         gymnasium.register(
-            env_id(name), entry_point=f"{at}Env", vector_entry_point=f"{at}VectorEnv", kwargs={"task": name}
+            env_id(name),
+            entry_point="contactsafe.tasks.base.task_env:TaskEnv",
+            vector_entry_point="contactsafe.tasks.base.task_vector_env:TaskVectorEnv",
+            kwargs={"task": name},
         )
 
 

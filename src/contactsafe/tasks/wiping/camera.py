@@ -11,6 +11,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.native import view2
@@ -106,7 +107,7 @@ def stack_cameras(tables: Sequence[CameraTables]) -> CameraTables:
 
 
 @compiled
-def camera_at(cameras, index):
+def camera_at(cameras: CameraTables, index: int) -> CameraTables:
     """Return one camera's tables out of those that `stack_cameras` put side by side."""
     return CameraTables(
         cameras.pixels[index], cameras.rays[index], cameras.distance[index], cameras.position[index],
@@ -155,7 +156,7 @@ def _distance_to_plane(rays: np.ndarray, position: np.ndarray, z: float) -> np.n
 
 
 @compiled(nogil=True)
-def render_mask(camera, cells, plant, out):
+def render_mask(camera: CameraTables, cells: np.ndarray, plant: Record, out: np.ndarray) -> None:
     """Render a mask of a board as it is: ink and dark objects 0, everything else 255.
 
     Args:
@@ -171,7 +172,7 @@ def render_mask(camera, cells, plant, out):
 
 
 @compiled(nogil=True)
-def render_mask_into(camera, shown, plant, out):
+def render_mask_into(camera: CameraTables, shown: np.ndarray, plant: Record, out: np.ndarray) -> None:
     """Render a mask from what an `InkIndex` keeps.
 
     Args:

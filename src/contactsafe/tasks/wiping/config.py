@@ -44,7 +44,7 @@ class RewardConfig:
     nearness_m: float = 0.3
     staying_pays: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a reward under which staying in contact for ever pays, unless that is asked for."""
         staying = self.contact + self.nearness
         if staying + self.time >= 0 and not self.staying_pays:
@@ -95,7 +95,7 @@ class WipingConfig(TaskConfig):
     camera: Camera = field(default_factory=Camera)
     reward: RewardConfig = field(default_factory=RewardConfig)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse a kind of board or an image source that cannot be."""
         super().__post_init__()
         check_boards(self.boards)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactsafe.core.arrays import Vector
 from contactsafe.core.byte_scan import places_unlike
 from contactsafe.core.compiled import compiled
 from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
@@ -38,7 +39,7 @@ def empty_ink_index(n: int, cells: int, size: int) -> InkIndex:
 
 
 @compiled(nogil=True)
-def enter(ink_index, i, cells, pixels):
+def enter(ink_index: InkIndex, i: int, cells: np.ndarray, pixels: np.ndarray) -> None:
     """Enter board i as it is now.
 
     Args:
@@ -52,7 +53,7 @@ def enter(ink_index, i, cells, pixels):
 
 
 @compiled
-def remove_erased(ink_index, i, cells, pixels):
+def remove_erased(ink_index: InkIndex, i: int, cells: np.ndarray, pixels: np.ndarray) -> None:
     """Take out of board i's entries what has been wiped since; arguments as for `enter`."""
     listed, shown = ink_index.cells[i], ink_index.shown[i]
     kept = 0
@@ -67,7 +68,7 @@ def remove_erased(ink_index, i, cells, pixels):
 
 
 @compiled
-def list_cells(cells, out):
+def list_cells(cells: np.ndarray, out: np.ndarray) -> int:
     """Write row and column of each cell that is not clean to `out`, (rows · columns, 2); return their number."""
     columns = cells.shape[1]
     numbers = np.empty(cells.size, dtype=np.int32)
@@ -78,7 +79,7 @@ def list_cells(cells, out):
 
 
 @compiled
-def count_shown(pixels, listed, shown):
+def count_shown(pixels: np.ndarray, listed: np.ndarray, shown: np.ndarray) -> None:
     """Count for each pixel, (size, size), in how many of the listed cells, (count, 2), it has a part."""
     shown[:] = 0
     for m in range(listed.shape[0]):
@@ -95,7 +96,9 @@ def _add(shown, pixels, row, column, number):
 
 
 @compiled(nogil=True)
-def nearest_ink(ink_index, i, cells, origin, cell, position):
+def nearest_ink(
+    ink_index: InkIndex, i: int, cells: np.ndarray, origin: Vector, cell: float, position: Vector
+) -> tuple[int, float]:
     """Count the ink and find how far the nearest of it lies from a point along the board.
 
     Args:

@@ -47,7 +47,7 @@ class Randomisation:
     inertia: Range = (1.0, 1.0)
     torque_delay_ticks: tuple[int, int] = (0, 0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse ranges that are none, or that no world can have."""
         for field in fields(self):
             low, high = getattr(self, field.name)

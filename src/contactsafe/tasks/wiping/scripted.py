@@ -45,7 +45,7 @@ class _Script(Independent):
         """Forget what was done in task i: its next episode begins."""
         self._landed[i] = False
 
-    def act(self, observation) -> np.ndarray:
+    def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18), for N observations."""
         pose, target = observation["pose"][:, :3], observation["target"][:, :3]
         force = observation["force"][:, 2]
@@ -82,7 +82,7 @@ class Raster(_Script):
         self._corners = np.array(ends) + board.centre[:2]
         self._next = np.zeros(num_envs, int)
 
-    def begin(self, i):
+    def begin(self, i: int) -> None:
         """Start again at the first corner."""
         super().begin(i)
         self._next[i] = 0
@@ -104,7 +104,7 @@ class NearestInk(_Script):
         size = config.camera.size
         self._ground = ground_of(homography, (size, size))
 
-    def act(self, observation):
+    def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18), for N observations."""
         picture = log_polar_features(observation["mask"], observation["pose"], self._ground)
         soft = picture[:, RINGS * SECTORS : RINGS * SECTORS + 3]

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.tasks.base.record import end_step, observe_arm
-from contactsafe.tasks.wiping.camera import camera_at, render_mask_into
-from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
+from contactsafe.tasks.wiping.camera import CameraTables, camera_at, render_mask_into
+from contactsafe.tasks.wiping.ink import InkIndex, nearest_ink, remove_erased
 from contactsafe.tasks.wiping.whiteboards import erase
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
@@ -28,7 +29,7 @@ rewards_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, *WEIGHTS)])
 
 
 @compiled
-def score(task, metrics, rewards, ink, distance):
+def score(task: Record, metrics: Record, rewards: Record, ink: int, distance: float) -> None:
     """Fill the reward's terms of one step, and the step's ends.
 
     Finishing must pay best: `ink` and `done` are paid once for what is gone; `approach` is a difference, so it
@@ -53,8 +54,10 @@ def score(task, metrics, rewards, ink, distance):
 
 @compiled(nogil=True)
 def finish(
-    start, stop, worlds, controllers, metrics, samples, boards, cells, cameras, ink_index, rewards, tasks, masks
-):  # fmt: skip
+    start: int, stop: int, worlds: np.ndarray, controllers: np.ndarray, metrics: np.ndarray, samples: np.ndarray,
+    boards: np.ndarray, cells: np.ndarray, cameras: CameraTables, ink_index: InkIndex, rewards: Record,
+    tasks: np.ndarray, masks: np.ndarray,
+) -> None:  # fmt: skip
     """Erase, score and look after the ticks of a step, in the worlds from start to stop.
 
     The arrays are those of `Worlds`, `Whiteboards` and `WipingTasks`.
@@ -71,7 +74,9 @@ def finish(
 
 
 @compiled
-def observe(plant, controller, camera, shown, task, mask):
+def observe(
+    plant: Record, controller: Record, camera: CameraTables, shown: np.ndarray, task: Record, mask: np.ndarray
+) -> None:
     """Fill what the policy sees: the tool's pose, where it is told to be and how stiffly, the force, the mask."""
     observe_arm(controller, task)
     render_mask_into(camera, shown, plant, mask)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
@@ -119,7 +120,16 @@ def _stamp(drawing, row, column, radius):
 
 
 @compiled
-def erase_under_pad(cells, origin_x, origin_y, cell, position, rotation, half_x, half_y):
+def erase_under_pad(
+    cells: np.ndarray,
+    origin_x: float,
+    origin_y: float,
+    cell: float,
+    position: Vector,
+    rotation: Matrix,
+    half_x: float,
+    half_y: float,
+) -> int:
     """Erase ink under a rectangular pad.
 
     Args:

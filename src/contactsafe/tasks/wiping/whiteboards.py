@@ -6,6 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.state import Entry, load_state_dict, of_array, of_records, state_dict
@@ -52,7 +53,9 @@ class Whiteboards(Independent):
 
     _bound = ("boards",)
 
-    def __init__(self, config: BoardConfig, camera: Camera, models: Sequence[mujoco.MjModel], pad_half):
+    def __init__(
+        self, config: BoardConfig, camera: Camera, models: Sequence[mujoco.MjModel], pad_half: Sequence[float]
+    ):
         self.config, self.camera_config, self.n = config, camera, len(models)
         board = Whiteboard(config)
         self.cells = np.zeros((self.n, *board.cells.shape), dtype=np.uint8)
@@ -113,7 +116,7 @@ class Whiteboards(Independent):
 
 
 @compiled
-def erase(board, cells, tick, metrics, samples):
+def erase(board: Record, cells: np.ndarray, tick: int, metrics: Record, samples: np.ndarray) -> None:
     """Erase what the pad wiped in one policy step.
 
     Args:

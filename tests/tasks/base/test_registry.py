@@ -1,0 +1,56 @@
+"""Tasks by name: each is found, made in either way of Gymnasium, and what is unknown is told with what there is."""
+
+import gymnasium
+import pytest
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.conditions import Conditions
+from contactsafe.tasks import ENGINES, TASKS, make_vec, task_by_name
+from contactsafe.tasks.base.registry import backend_of, env_id, register_task
+from contactsafe.tasks.base.task import Task, TaskOptions
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_task_bears_the_name_that_it_is_found_by(name):
+    task = task_by_name(name)
+    assert isinstance(task, Task)
+    assert task.name == name
+    assert env_id(name) in gymnasium.registry
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_tasks_configuration_keeps_to_options_and_conditions(name):
+    task = task_by_name(name)
+    assert task.config() == task.simulation.config_type()
+    conditions = Conditions(controller="vices", gains="low")
+    assert task.config(None, conditions).controller == "vices"
+    assert task.config(None, conditions).action.gains == "low"
+    asked = task.options(controller="paper", pushed=True)
+    assert task.config(asked, conditions).controller == "paper"
+    assert task.config(asked, conditions).pushes is not None
+
+
+def test_options_left_out_set_no_controller():
+    assert TaskOptions().settings() == {"pushes": None}
+
+
+def test_what_is_unknown_is_told_with_what_there_is():
+    for find in (task_by_name, lambda name: make_vec(name, 1)):
+        with pytest.raises(InvalidInputError, match=f"task 'cartpole' is unknown; choose from {', '.join(TASKS)}"):
+            find("cartpole")
+    with pytest.raises(InvalidInputError, match=f"engine = 'steam'; choose {' or '.join(ENGINES)}"):
+        backend_of("steam")
+
+
+def test_registering_a_subclass_of_tasks_is_enough_and_twice_is_once(monkeypatch):
+    place = "contactsafe.tasks.wiping.tasks:WipingTasks"
+    try:
+        register_task("bare", place)
+        register_task("bare", place)
+        task = task_by_name("bare")
+        assert task == Task(task.simulation)
+        assert task.scenes is None
+        assert list(task.scripted) == ["random"]
+    finally:
+        TASKS.pop("bare", None)
+        gymnasium.registry.pop(env_id("bare"), None)
