@@ -19,7 +19,7 @@ _DIGESTS = FOLDER / "digests.json"
 
 
 def digest(example: Path) -> str:
-    """Return the digest of what an example's picture is drawn by: its file, and what the examples share."""
+    """Return the digest of what an example's picture is drawn by: its file, and what all examples use."""
     shared = sorted(path for path in SOURCES.iterdir() if path.is_file() and path not in EXAMPLES)
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in (example, *shared))).hexdigest()
 

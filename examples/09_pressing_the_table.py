@@ -1,4 +1,4 @@
-"""A target inside the table: impedance presses the harder the deeper it lies, unless its force is bounded.
+"""A target inside the table: the force of an impedance grows with its depth, unless it is bounded.
 
 Picture: force of the tool on the table against the depth of the target below it.
 """

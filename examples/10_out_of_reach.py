@@ -1,6 +1,6 @@
 """A target out of reach stretches the arm until it cannot move outwards: there the task inertia is damped.
 
-Picture: target and tool on the way out and back, and the fastest joint, as a part of its speed limit.
+Picture: target and tool on the path out and back, and the fastest joint, as a part of its speed limit.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Measurements that do not come: up to 20 ticks are bridged by a prediction, after more the arm is braked.
 
-Picture: the tool on its way while measurements are lost for 20 ms, and for 60 ms.
+Picture: the tool on its path while measurements are lost for 20 ms, and for 60 ms.
 """
 
 import mujoco

@@ -1,4 +1,4 @@
-"""What the pictures of the examples share: colours, type, arms as capsules, and where they are saved."""
+"""What the pictures of the examples have in common: colours, type, arms as capsules, and where they are saved."""
 
 from pathlib import Path
 
@@ -11,12 +11,15 @@ from matplotlib.patches import Polygon
 from contactsafe.report.data import COLOURS
 from contactsafe.report.scene import View
 from contactsafe.robot.description import ArmDescription, Tool
-from contactsafe.robot.shape import arm_capsules
+from contactsafe.robot.shape import arm_capsules, tip_box
 
 COLOUR = {name: on_light for name, (on_light, _) in COLOURS.items()}
 """Of the controllers, as in the report."""
 
-INK, SOFT, ARM, OBSTACLE, BAND = "#1c2126", "#5a646e", "#dfe4e9", "#e3a13c", "#eef1f4"
+INK, SOFT, ARM, BLOCK, OBSTACLE, BAND = "#1c2126", "#5a646e", "#dfe4e9", "#3f5f8f", "#e3a13c", "#eef1f4"
+
+_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_FACES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
 
 _STYLE = {
     "font.size": 10, "axes.spines.top": False,
@@ -52,7 +55,7 @@ def save(figure: Figure, example: str, folder: Path | str) -> Path:
 
 
 def draw_arm(axis: Axes, arm: ArmDescription, tool: Tool, q: np.ndarray, view: View, edge=SOFT, opacity=1.0) -> None:
-    """Draw an arm's capsules, the farthest first.
+    """Draw an arm's capsules and its tip, the farthest first.
 
     Args:
         axis: in metres, of `view`.
@@ -64,9 +67,15 @@ def draw_arm(axis: Axes, arm: ArmDescription, tool: Tool, q: np.ndarray, view: V
     """
     starts, ends, radii, _ = arm_capsules(arm, tool, q[None])
     starts, ends = ((x[0] - view.target) @ view.axes().T for x in (starts, ends))
-    for k in np.argsort(starts[:, 2] + ends[:, 2]):
-        outline = _stadium(starts[k, :2], ends[k, :2], radii[k])
-        axis.add_patch(Polygon(outline, facecolor=ARM, edgecolor=edge, linewidth=0.9, alpha=opacity))
+    middles = (starts[:, 2] + ends[:, 2]) / 2
+    parts = [(middles[k], _stadium(starts[k, :2], ends[k, :2], radii[k]), ARM) for k in range(len(radii))]
+    if tool.tip is not None and tool.tip.shape == "box":
+        centre, half, rotation = tip_box(arm, tool, q[None])
+        corners = (centre[0] + (_CORNERS * half) @ rotation[0].T - view.target) @ view.axes().T
+        nearest = sorted(_FACES, key=lambda face: corners[face, 2].mean())[3:]
+        parts += [(corners[:, 2].mean() + 1e-6 * k, corners[face, :2], BLOCK) for k, face in enumerate(nearest)]
+    for _, outline, colour in sorted(parts, key=lambda part: part[0]):
+        axis.add_patch(Polygon(outline, facecolor=colour, edgecolor=edge, linewidth=0.9, alpha=opacity))
     width, height = view.span
     axis.set(aspect="equal", xlim=(-width / 2, width / 2), ylim=(-height / 2, height / 2))
     axis.set_axis_off()

@@ -93,7 +93,7 @@ CHECKS = {
     "05_forearm_meets_bottle": check_bottle,
     "06_what_the_observer_sees": check_observer,
     "07_how_soon_a_push_is_noticed": check_delays,
-    "08_elbow_gives_way": check_elbow,
+    "08_elbow_moves_tool_stays": check_elbow,
     "09_pressing_the_table": check_pressing,
     "10_out_of_reach": check_reach,
     "11_a_load_nobody_mentioned": check_load,

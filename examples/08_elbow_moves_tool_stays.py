@@ -1,4 +1,4 @@
-"""Seven joints, six directions of the tool: the elbow is free to move. Pushed, it gives way and the tool stays.
+"""Seven joints, six directions of the tool: the elbow is free to move. Pushed, it moves and the tool stays.
 
 Picture: the arm from the front, before and during a push on the elbow, and how far elbow and tool move.
 """
