@@ -15,7 +15,7 @@ from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.panda import PANDA
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
-from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
+from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG, PEG_RADIUS
 from contactsafe.tasks.insertion.tasks import InsertionTasks
