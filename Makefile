@@ -15,7 +15,7 @@ PYTEST := $(TEST_BIN)/python -m pytest -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo bench test portable check docs clean require-python
+.PHONY: help demo bench test portable check docs gallery clean require-python
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -40,11 +40,14 @@ check: $(TEST_VENV)/.ready  ## lint, format, types, direction of imports, sizes,
 	$(TEST_BIN)/python tools/sizes.py
 	$(TEST_BIN)/sphinx-build -W --keep-going -q -b html docs build/docs
 
-docs: $(TEST_VENV)/.ready  ## build the documentation in build/docs
+gallery: $(TEST_VENV)/.ready  ## draw the pictures of all examples in docs/gallery
+	$(TEST_BIN)/python docs/pictures.py --all
+
+docs: gallery  ## build the documentation in build/docs
 	$(TEST_BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
 clean:  ## remove environments, builds and caches
-	rm -rf $(VENV) $(TEST_VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis docs/api
+	rm -rf $(VENV) $(TEST_VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis docs/api docs/gallery
 	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # An environment is ready when its stamp is newer than what it was made from.

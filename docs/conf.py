@@ -22,6 +22,7 @@ release = version = contactsafe.__version__
 extensions = [
     "equations",
     "offline",
+    "pictures",
     "myst_parser",
     "sphinx.ext.apidoc",
     "sphinx.ext.autodoc",

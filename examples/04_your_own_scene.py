@@ -1,9 +1,13 @@
-"""Your own arm in your own MuJoCo scene and loop: the forearm meets a box that nobody planned for."""
+"""Your own arm in your own MuJoCo scene and loop: the forearm meets a box that nobody planned for.
+
+Picture: the force on the box over time, with and without contact safety.
+"""
 
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from drawing import COLOUR, panels, save
 
 import contactsafe as cs
 
@@ -18,8 +22,8 @@ def sweep(start: cs.Target, tick: int) -> cs.Target:
     return start._replace(pose=start.pose._replace(position=start.pose.position + left))
 
 
-def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[float, float, int]:
-    """Sweep; return the force on the box at its peak and over the last half second, N, and the link reported."""
+def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[np.ndarray, int]:
+    """Sweep; return the force on the box, (ticks,), N, and the link reported at the end, 0 for none."""
     model = mujoco.MjModel.from_xml_path(str(SCENE))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
@@ -37,16 +41,22 @@ def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[float, floa
         data.ctrl[at.ctrl] = out.torque / at.gear
         mujoco.mj_step(model, data, at.steps)
         force[tick] = data.sensor("box").data[0]
-    return force.max(), force[-500:].mean(), out.contact.link if out.contact.in_contact else 0
+    return force, out.contact.link if out.contact.in_contact else 0
 
 
-def main() -> dict[str, float]:
-    """Run with and without contact safety, and return the lasting force on the box, N."""
+def main(folder: str = ".") -> dict[str, float]:
+    """Draw, and return the lasting force on the box (mean of the last half second) for each controller, N."""
+    figure, axis = panels()
     lasting = {}
     for name, config in (("vices", cs.presets.vices()), ("safe", cs.presets.safe())):
-        peak, lasting[name], link = collide(config)
+        force, link = collide(config)
+        lasting[name] = float(force[-500:].mean())
         reported = f"contact reported on link {link}" if link else "no contact reported"
-        print(f"{name}: {reported}; the box feels {peak:.0f} N at the impact, {lasting[name]:.0f} N in the end")
+        print(f"{name}: {reported}; the box feels {force.max():.0f} N at the impact, {lasting[name]:.0f} N in the end")
+        axis.plot(np.arange(len(force)) / 1000, force, color=COLOUR[name], label=name)
+    axis.set(xlabel="time (s)", ylabel="force on the box (N)", xlim=(0, 3), ylim=(0, None))
+    axis.legend(loc="upper right", frameon=False)
+    save(figure, __file__, folder)
     return lasting
 
 

@@ -1,13 +1,53 @@
-"""Programs of the documentation, which is no package, and what its pages say they print."""
+"""Programs of the documentation, which is no package; its runnable pages, and what they say they print."""
 
 import importlib.util
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
+PAGES = sorted(path for path in DOCS.rglob("*.md") if "<!-- runnable" in path.read_text(encoding="utf-8"))
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+_BLOCK = re.compile(
+    r"^<!-- runnable(?:: (?P<file>\S+))? -->\n+```(?P<language>\w+)\n(?P<code>.*?)^```\n"
+    r"(?:\s*It prints:\s*```text\n(?P<shown>.*?)^```\n)?",
+    re.MULTILINE | re.DOTALL,
+)
+_SHELL = 'set -e; python() { "%s" "$@"; }; contactsafe() { python -m contactsafe "$@"; }\n'
+_A_MOMENT = "--max-minutes 0.02"
+
+
+def run_page(page, folder):
+    """Run a page's blocks marked `<!-- runnable -->`, top to bottom; return what each printed.
+
+    A block marked `<!-- runnable: NAME -->` is written to that file. What stands after "It prints:" is compared. A
+    training of minutes is cut to a moment.
+
+    Args:
+        page: path of the page.
+        folder: empty, to run in; the examples are copied there, as in a clone.
+    """
+    shutil.copytree(DOCS.parent / "examples", folder / "examples")
+    printed = []
+    for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+        if block["file"]:
+            (folder / block["file"]).write_text(block["code"], encoding="utf-8")
+            continue
+        command = [sys.executable, "-c", block["code"]]
+        if block["language"] != "python":
+            assert block["language"] == "sh", f"{page.name}: cannot run {block['language']}"
+            code = re.sub(r"--max-minutes [\d.]+", _A_MOMENT, block["code"])
+            command = ["bash", "-c", _SHELL % sys.executable + code]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{page.name}: {done.stdout}{done.stderr}"
+        if block["shown"]:
+            assert_prints(done.stdout, block["shown"])
+        printed.append(done.stdout)
+    return printed
 
 
 def program(name):

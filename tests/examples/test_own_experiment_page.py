@@ -3,23 +3,17 @@
 import importlib.util
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "howto" / "own_experiment.md").read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    (code,) = re.findall(r"<!-- runnable -->\n```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-    folder = tmp_path_factory.mktemp("own")
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout, folder / "dropping"
+@pytest.fixture
+def run(ran):
+    (printed,), folder = ran("howto/own_experiment.md")
+    return printed, folder / "dropping"
 
 
 def test_its_metric_is_in_the_terminals_table(run):
