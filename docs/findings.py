@@ -205,7 +205,7 @@ def say(text: str) -> None:
     print("   ", text, flush=True)
 
 
-def shares(values: Sequence[float], unit: str) -> str:
+def spreads(values: Sequence[float], unit: str) -> str:
     """Write median, 95th percentile and largest of some figures."""
     return f"{np.median(values):.0f} / {np.percentile(values, 95):.0f} / {np.max(values):.0f} {unit}"
 
@@ -267,7 +267,9 @@ def projector_is_zero() -> None:
     }.items():
         traces = hold(config, 1.2, pushes)
         speed = np.abs(traces["q"][:, -1] - traces["q"][:, -11]).max(axis=1) / 0.01
-        say(f"{name:26s} 25 N on link 5 for 1 s: tool {shares(strays_mm(traces), 'mm')}, joint {speed.max():.2f} rad/s")
+        say(
+            f"{name:26s} 25 N on link 5 for 1 s: tool {spreads(strays_mm(traces), 'mm')}, joint {speed.max():.2f} rad/s"
+        )
 
 
 def slow_observer() -> None:
@@ -303,12 +305,12 @@ def _battery(laws: dict[str, cs.ControllerConfig], trials: int) -> None:
             [trial.metrics[figure] for trial in result.trials if trial.controller == name]
             for figure in ("contact_peak_n", "contact_steady_n")
         )
-        line = f"peak {shares(peak, 'N'):22s} steady {shares(steady, 'N'):20s}"
+        line = f"peak {spreads(peak, 'N'):22s} steady {spreads(steady, 'N'):20s}"
         say(f"{name:14s} {line} peak regressions: {count:.0f} of {trials}")
 
 
 def yield_or_hold() -> None:
-    """One bound for all contacts either presses obstacles or lets pushers carry the arm away."""
+    """One bound for all contacts either presses obstacles or lets a person's push carry the arm away."""
     free = FAST.with_(contact_torque_limit_comply_nm=math.inf, contact_torque_limit_reject_nm=math.inf)
     laws = {
         "no bound": free,
@@ -319,8 +321,8 @@ def yield_or_hold() -> None:
     for name, config in laws.items():
         strays = strays_mm(hold(config, 1.7, lasting_pushes()))
         steady = [trial.metrics["contact_steady_n"] for trial in battery.trials if trial.controller == name]
-        say(f"{name:13s} 12 pushes of 25 N for 1.5 s: tool {shares(strays, 'mm'):18s} 16 collisions: "
-            f"steady {shares(steady, 'N')}")  # fmt: skip
+        say(f"{name:13s} 12 pushes of 25 N for 1.5 s: tool {spreads(strays, 'mm'):18s} 16 collisions: "
+            f"steady {spreads(steady, 'N')}")  # fmt: skip
 
 
 def printed_projector_is_0_over_0() -> None:
@@ -347,7 +349,7 @@ def tool_and_arm_told_apart() -> None:
         tool, arm = m.J.T @ rng.standard_normal(6), sample_push(ARM, m.q, rng, CONTACT).torque
         for name, torque in (("tool", tool), ("arm", arm)):
             seen[name].append(np.linalg.norm(m.N_t.T @ torque) / np.linalg.norm(torque))
-    say(f"share of a joint torque in the null space: wrench at the tool at most {max(seen['tool']):.0e}, "
+    say(f"part of a joint torque in the null space: wrench at the tool at most {max(seen['tool']):.0e}, "
         f"push on links 3-7 median {np.median(seen['arm']):.2f}")  # fmt: skip
     found = []
     for body in ("tool", "link4"):
@@ -440,11 +442,11 @@ def force_added_drags_the_arm() -> None:
     for name, traces in runs.items():
         peaks = [trace["obstacle_force"].max() for trace in traces]
         steady = [trace["obstacle_force"][-500:].mean() for trace in traces]
-        say(f"{name:18s} 24 sweeps: peak {shares(peaks, 'N'):20s} steady {shares(steady, 'N')}")
+        say(f"{name:18s} 24 sweeps: peak {spreads(peaks, 'N'):20s} steady {spreads(steady, 'N')}")
 
 
 def pusher_or_obstacle() -> None:
-    """The sign of the work misses many that push a moving arm; giving way a little to see whether it eases does not."""
+    """The sign of the work misses many that push a moving arm; yielding a little to see whether it eases does not."""
     scenes = Scenes(48)
     real = [motion.world(met, True) for motion, met in zip(scenes.motions, scenes.obstacles, strict=True)]
     found: dict[str, list[list[int]]] = {}
@@ -457,7 +459,7 @@ def pusher_or_obstacle() -> None:
     for name, rows in found.items():
         fast, safe = (np.array([row[1:] for row in rows if row[0] == which]).sum(axis=0) for which in (False, True))
         by_work = f"{fast[1]} of {fast[0]} (no bound), {safe[1]} of {safe[0]} (safe)"
-        say(f"{name:24s} taken for a pusher by its work: {by_work}; by giving way: {safe[2]} of {safe[0]}")
+        say(f"{name:24s} taken for a push by its work: {by_work}; by yielding: {safe[2]} of {safe[0]}")
 
 
 def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarray]:
@@ -478,7 +480,7 @@ def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarr
 
 
 def _verdicts(trace: np.ndarray) -> tuple[bool, bool, bool]:
-    """Tell whether a contact was found, whether its work in the next 50 ms says pusher, and the controller in 0.5 s."""
+    """Tell whether a contact was found, whether its work in the next 50 ms says push, and the controller in 0.5 s."""
     found = (trace["mode"] != FREE) & (np.abs(trace["tau_arm"]).max(axis=1) > 0.3)
     first = int(np.argmax(found))
     work = np.einsum("ti,ti->t", trace["residual_fast"][:-1], np.diff(trace["q"], axis=0))
@@ -487,7 +489,7 @@ def _verdicts(trace: np.ndarray) -> tuple[bool, bool, bool]:
 
 
 def stiff_pusher_that_stays() -> None:
-    """Where the null space does not give way, holding the tool against a stiff thing that stays means pressing hard."""
+    """Where the null space does not yield, rejecting a stiff thing that stays means pressing hard."""
     laws = {
         "vices": VICES,
         "no bound": FAST,
@@ -546,23 +548,23 @@ def _unit_torque(origins: np.ndarray, rotations: np.ndarray, row: np.ndarray) ->
     return point_torque(origins, rotations, link, place, -rotations[link] @ row[4:])
 
 
-def weight_of_the_links() -> None:
-    """Links 10 % off weigh more than the threshold; they are weighed while nothing touches the arm."""
+def masses_of_the_links() -> None:
+    """A mass error of 10 % exceeds the threshold; they are identified while nothing touches the arm."""
     heavy = replace(ARM, model=mujoco.MjModel.from_xml_string(_arm_mjcf(mass=1.1)))
     off = np.median([np.abs(model_at(q, heavy).g - model_at(q).g) for q in postures(100)], axis=0)
     say(f"links 10 % heavier: {', '.join(f'{nm:.1f}' for nm in off)} N m at joints 1 to 7, median of 100 postures")
     strokes = sample_strokes(ARM, 0, 6)
-    laws = {"paper": PAPER, "safe, not weighing": SAFE.with_(mass_uncertainty=0.0), "safe": SAFE}
+    laws = {"paper": PAPER, "safe, no masses": SAFE.with_(mass_uncertainty=0.0), "safe": SAFE}
     for name, config in laws.items():
         found = [trial.metrics for trial in false_alarm_trials(ARM, name, config, strokes)]
-        alarms, lasted = sum(f["false_alarms"] for f in found), sum(f["false_contact_s"] for f in found)
+        contacts, lasted = sum(f["false_alarms"] for f in found), sum(f["false_contact_s"] for f in found)
         minutes = sum(f["minutes"] for f in found)
-        counted = f"{alarms:.0f} false contacts, {lasted:.0f} s of them"
+        counted = f"{contacts:.0f} false contacts, {lasted:.0f} s of them"
         say(f"{name:19s} masses ± 10 %, {minutes:.1f} min without contact: {counted}")
 
 
-def blow_of_a_fixed_thing() -> None:
-    """The peak of a blow against a thing that cannot move comes before any law can know of it."""
+def impact_on_a_fixed_thing() -> None:
+    """The peak of an impact on a thing that cannot move comes before any law can know of it."""
     scenes = Scenes(16, sweeps_only=True)
     worlds = [
         WorldConfig(obstacles=tuple(replace(obstacle, stiffness=math.inf) for obstacle in met))
@@ -570,8 +572,8 @@ def blow_of_a_fixed_thing() -> None:
     ]
     before: list[float] = []
     for name, config in {"vices": VICES, "paper": PAPER, "safe": SAFE}.items():
-        blows = [_blow(trace) for trace in scenes.run(config, worlds)]
-        peak, peak_ms, found_ms, later = (np.array(column) for column in zip(*blows, strict=True))
+        impacts = [_impact(trace) for trace in scenes.run(config, worlds)]
+        peak, peak_ms, found_ms, later = (np.array(column) for column in zip(*impacts, strict=True))
         before = before or peak.tolist()
         same = np.abs(peak / before - 1.0) < 0.1
         say(f"{name:6s} first 20 ms: peak {np.median(peak):.0f} N after {np.median(peak_ms):.0f} ms "
@@ -579,7 +581,7 @@ def blow_of_a_fixed_thing() -> None:
             f"later up to {np.median(later):.0f} N")  # fmt: skip
 
 
-def _blow(trace: np.ndarray) -> tuple[float, int, float, float]:
+def _impact(trace: np.ndarray) -> tuple[float, int, float, float]:
     """Give the peak of the first 20 ms, N, when it was and when the contact was found, ms, and what came later, N."""
     first = int(np.argmax(trace["obstacle_force"] > 0.5))
     force, found = trace["obstacle_force"][first:], trace["link"][first:] > 0
@@ -587,10 +589,10 @@ def _blow(trace: np.ndarray) -> tuple[float, int, float, float]:
     return force[peak_ms], peak_ms, np.argmax(found) if found.any() else math.inf, force[20:].max()
 
 
-def pull_and_energy() -> None:
-    """K e of a far target is a force without bound: bound the pull, and the energy that the command may give."""
+def force_and_energy() -> None:
+    """K e of a far target is a force without bound: bound that force, and the energy that the command may give."""
     m, error = model_at(ARM.home), np.array([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
-    pulls = [
+    forces = [
         np.linalg.norm(
             stiffness_wrench(
                 m.Lambda,
@@ -602,13 +604,13 @@ def pull_and_energy() -> None:
         )
         for c in (PAPER, SAFE)
     ]
-    say(f"a target 10 m away, K1 1500 1/s²: pulled with {pulls[0]:.0f} N; bounded {pulls[1]:.0f} N")
+    say(f"a target 10 m away, K1 1500 1/s²: a force of {forces[0]:.0f} N; bounded {forces[1]:.0f} N")
     tank = {"tank_j": SAFE.limits.tank_j, "tank_power_w": SAFE.limits.tank_power_w}
-    pull = {
+    bounded = {
         name: getattr(SAFE, name)
         for name in ("task_acceleration_max_m_s2", "task_acceleration_max_rad_s2", "posture_error_max_rad")
     }
-    laws = {"paper": PAPER, "+ tank": PAPER.with_(**tank), "+ bounded pull": PAPER.with_(**pull), "safe": SAFE}
+    laws = {"paper": PAPER, "+ tank": PAPER.with_(**tank), "+ bounded force": PAPER.with_(**bounded), "safe": SAFE}
     for name, config in laws.items():
         found = run_adversarial(ARM, config, range(8), 5000)
         given, beyond = (max(f[figure] for f in found) for figure in ("energy_given_j", "joint_range_beyond_mrad"))
@@ -617,7 +619,7 @@ def pull_and_energy() -> None:
 
 
 def gains_that_pump() -> None:
-    """Stiffness that rises on the way in and falls on the way out feeds the arm; bounding its rise stops that."""
+    """Stiffness that rises going in and falls going out feeds the arm; bounding its rise stops that."""
     for name, config in {"gains as asked": VICES, "gains rise passively": VICES.with_(passive_gains=True)}.items():
         loop = Loop(config)
         goal, soft, stiff = loop.target, np.full(6, 40.0), np.full(6, 160.0)
@@ -653,9 +655,9 @@ FINDINGS: dict[int, Callable[[], None]] = {
     13: pusher_or_obstacle,
     14: stiff_pusher_that_stays,
     15: naming_the_link,
-    16: weight_of_the_links,
-    17: blow_of_a_fixed_thing,
-    18: pull_and_energy,
+    16: masses_of_the_links,
+    17: impact_on_a_fixed_thing,
+    18: force_and_energy,
     19: gains_that_pump,
 }
 

@@ -50,7 +50,7 @@ class Boards:
 
 
 def boards(sampler, count, seed):
-    """Draw boards with ink in sight."""
+    """Draw boards with ink in view."""
     masks, tools = sampler.sample(count, seed)
     fine = rectify(masks, tools, sampler.homography)
     seen = (fine == 0).any((1, 2))

@@ -37,23 +37,6 @@ INSTEAD = {
 EXCEPT = r"(?<!false )(?<!false_)"  # the rate of false alarms is the field's
 BANNED = re.compile(rf"(?<![\w-]){EXCEPT}({'|'.join(' '.join(INSTEAD.values()).split())})(?![\w-])", re.IGNORECASE)
 
-STILL_THERE = {
-    "docs/concepts": 100,
-    "docs/findings.py": 35,
-    "docs/howto": 10,
-    "docs/vision_encoders.py": 1,
-    "src/contactsafe/control": 223,
-    "src/contactsafe/core": 6,
-    "src/contactsafe/experiments": 3,
-    "src/contactsafe/policy": 1,
-    "src/contactsafe/report": 2,
-    "src/contactsafe/robot": 55,
-    "src/contactsafe/sim": 5,
-    "src/contactsafe/tasks": 6,
-    "src/contactsafe/vision": 24,
-}
-"""Where such words are still to be replaced, and how often: numbers that may only fall."""
-
 
 def area(path):
     """Return the room of a source file, the folder of a page."""
@@ -73,7 +56,7 @@ def found():
 def test_words_that_the_field_does_not_use_are_gone(place):
     words = found()[place]
     remedy = {word: say for say, banned in INSTEAD.items() for word in banned.lower().split() if word in words}
-    assert words.total() <= STILL_THERE.get(place, 0), f"{place}: {dict(words)}; say {remedy}"
+    assert not words, f"{place}: {dict(words)}; say {remedy}"
 
 
 def test_identifiers_of_the_glossary_exist():

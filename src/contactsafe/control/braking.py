@@ -72,7 +72,7 @@ def brake_into(
 def _followed(momentum: float, tau_max: float, torque_rate: float) -> float:
     """Return the rate at which a motor whose torque changes no faster than `torque_rate` can brake a momentum, 1/s.
 
-    p' = −√(2 s r p) asks for the torque rate s r all the way down to rest. A brake that asks for more lags behind
+    p' = −√(2 s r p) asks for the torque rate s r until it rests. A brake that asks for more lags behind
     itself, and drives: were it stiff, τ' = −r sign(v) would swing an inertia for ever.
     """
     if momentum == 0.0:

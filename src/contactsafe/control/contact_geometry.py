@@ -2,7 +2,7 @@
 
 A contact without friction pushes along the surface's normal, so each point of the surface has one direction of joint
 torque, t = J_pᵀ n; the point whose t is nearest in angle to the torque found explains it best (Manuelli & Tedrake 2016
-search the same way with particles). Where an arm doubts short lever arms, of points that explain it alike the one that
+do so with particles). Where an arm doubts short lever arms, of points that explain it alike the one that
 takes less force. What gives no torque, near a joint's axis, cannot be told apart by anybody.
 """
 

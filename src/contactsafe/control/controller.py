@@ -266,7 +266,7 @@ class Controller(Independent):
 
 
 def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
-    """Return each field of one record as an array that shares its memory: reading and writing it is quick."""
+    """Return each field of one record as an array on its memory: reading and writing it is quick."""
     return {
         name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names or ()
     }

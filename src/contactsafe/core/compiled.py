@@ -137,7 +137,7 @@ def inlined(function: Callable) -> Any:
 
 
 ANNOUNCEMENT = (
-    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it ahead)"
+    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it beforehand)"
 )
 """What is said on stderr when the first function has to be compiled; what is in the cache is loaded in silence."""
 

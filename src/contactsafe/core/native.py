@@ -50,7 +50,7 @@ def _warn(message: str) -> None:
 
 
 if mujoco.get_mju_user_warning() is None:
-    mujoco.set_mju_user_warning(_warn)  # its own way writes MUJOCO_LOG.TXT wherever the process stands
+    mujoco.set_mju_user_warning(_warn)  # its own handler writes MUJOCO_LOG.TXT wherever the process stands
 
 _pp = (types.uintp, types.uintp)
 mj_kinematics = types.ExternalFunction("mj_kinematics", types.void(*_pp))

@@ -67,7 +67,7 @@ def run(command: Callable[[], int]) -> int:
 
 
 class _LostError(BaseException):
-    """Standard output cannot be written. No `except Exception` on the way is to take it for its own."""
+    """Standard output cannot be written. No `except Exception` in between is to take it for its own."""
 
     def __init__(self, reason: OSError):
         super().__init__(str(reason))

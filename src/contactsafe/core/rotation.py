@@ -76,7 +76,7 @@ def quat_multiply(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def quat_to_rotvec(quat: Vector) -> Vector:
-    """Give the rotation vector of a unit quaternion, the shortest way round, (3,), rad."""
+    """Return the rotation vector of a unit quaternion, the shorter one, (3,), rad."""
     out = np.empty(3)
     sign = 1.0 if quat[0] >= 0.0 else -1.0
     norm = math.sqrt(quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3])

@@ -132,7 +132,7 @@ def _method(experiments: Sequence[Experiment], names: Sequence[str], info: Mappi
         "run.</p>"
         "<p><strong>What this does not show.</strong> Everything here is simulated, with an arm that is what the "
         "controllers' model of it says, or, where an experiment says so, one with errors sampled at random; a real one "
-        "differs in other ways too. The figures compare controllers under equal conditions. "
+        "differs in other respects too. The figures compare controllers under equal conditions. "
         "They are no certificate, and no proof that any contact with a person is harmless.</p>"
     )
     found = {

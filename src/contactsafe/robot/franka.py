@@ -99,4 +99,4 @@ WIPER = Tool(
     capsules=_HAND_CAPSULES,
     tip=Tip(_WIPER_HALF),
 )
-"""The gripper holding a felt block of 90 × 70 × 50 mm and 0.1 kg; the TCP is the middle of its lower face."""
+"""The gripper with a felt block of 90 × 70 × 50 mm and 0.1 kg; the TCP is the middle of its lower face."""

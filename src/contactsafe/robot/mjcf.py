@@ -88,7 +88,7 @@ def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
 
 
 def model_root(name: str) -> ET.Element:
-    """Start an MJCF document with the options every model shares: 1 kHz, dense Jacobians (mujoco 4.0.0 needs them)."""
+    """Start an MJCF document with the options of every model: 1 kHz, dense Jacobians (mujoco 4.0.0 needs them)."""
     root = ET.Element("mujoco", model=name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     option = ET.SubElement(root, "option", timestep="0.001", jacobian="dense", cone="elliptic")

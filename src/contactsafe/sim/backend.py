@@ -16,7 +16,7 @@ class Backend(Protocol):
     """One arm and what stands about it, in some engine."""
 
     def reset(self, q: np.ndarray) -> None:
-        """Put the arm at rest at q (n,) rad, its motors holding its nominal weight; all else is as it was built."""
+        """Put the arm at rest at q (n,) rad, its motors carrying its nominal weight; all else is as it was built."""
 
     def read(self, world: np.void) -> None:
         """Fill `truth` of a `world_dtype` record, all of it."""

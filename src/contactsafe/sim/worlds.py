@@ -287,7 +287,7 @@ class Worlds(Independent):
         return ticks
 
     def place_fixture(self, i: int, name: str, position: ArrayLike, quat: ArrayLike) -> None:
-        """Put a fixture of world i elsewhere; its worlds must not share their models. Reset the world next.
+        """Put a fixture of world i elsewhere; its worlds must have a model each. Reset the world next.
 
         Args:
             i: which world.

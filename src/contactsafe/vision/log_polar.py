@@ -1,4 +1,4 @@
-"""The camera's mask as a retina sees it: fine about the tool, coarse far off, and no speck too small to count.
+"""The camera's mask at a resolution that falls with distance: fine about the tool, coarse far off, and no speck too small to count.
 
 What a wiping policy must read off the picture is where ink is from here. A grid in the camera's frame, or a small
 code of one, loses the last speck; a grid in the logarithm of the distance keeps it, and says direction and distance
@@ -26,7 +26,7 @@ RADIUS_M = (0.01, 0.45)
 """Distances of the first and the last ring's middle; nearer counts as the first, farther as the last."""
 
 SCALES_M = (0.01, 0.03, 0.1)
-"""Ink this far from the nearest ink weighs 1/e in the patch about it."""
+"""Ink this far from the nearest ink counts 1/e in the patch about it."""
 
 AMOUNT_M2 = 2e-5
 """Ink area that counts as one, about a camera pixel: amounts are given as log(1 + area / AMOUNT_M2)."""

@@ -51,7 +51,7 @@ class Segmenter:
         ink: thresholds of brightness and size.
 
     Raises:
-        InvalidInputError: a size below 8 pixels, a homography that is not finite, a board out of sight.
+        InvalidInputError: a size below 8 pixels, a homography that is not finite, a board that is not in view.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ def _background(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
 
 
 def _histogram(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Count the grey levels of what is seen, of every third pixel each way, (256,)."""
+    """Count the grey levels of what is seen, of every third pixel of every third row, (256,)."""
     sample, looked_at = (np.ascontiguousarray(plane[::3, ::3]) for plane in (picture, seen))
     return cv2.calcHist([sample], [0], looked_at, [256], [0, 256]).ravel()
 

@@ -49,14 +49,14 @@ def rims(solids: Solids, eye: np.ndarray) -> np.ndarray:
 
 
 def _rims_of_spheres(centres: np.ndarray, radii: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Points around the circles in which lines of sight touch spheres, (k, 2, m, 3), for centres (k, 2, 3)."""
-    sights = centres - eye
-    distances = np.linalg.norm(sights, axis=-1)
-    shares = np.minimum((radii / distances) ** 2, 0.99)
-    sideways = np.cross(sights, np.where(np.abs(sights[..., :1]) < 0.5 * distances[..., None], *np.eye(3)[:2]))
+    """Return points around the circles in which rays from an eye touch spheres, (k, 2, m, 3), for centres (k, 2, 3)."""
+    rays = centres - eye
+    distances = np.linalg.norm(rays, axis=-1)
+    fractions = np.minimum((radii / distances) ** 2, 0.99)
+    sideways = np.cross(rays, np.where(np.abs(rays[..., :1]) < 0.5 * distances[..., None], *np.eye(3)[:2]))
     sideways /= np.linalg.norm(sideways, axis=-1, keepdims=True)
-    across = np.cross(sights / distances[..., None], sideways)
-    middles, circles = centres - shares[..., None] * sights, radii * np.sqrt(1 - shares)
+    across = np.cross(rays / distances[..., None], sideways)
+    middles, circles = centres - fractions[..., None] * rays, radii * np.sqrt(1 - fractions)
     directions = _CIRCLE[:, :1] * sideways[..., None, :] + _CIRCLE[:, 1:] * across[..., None, :]
     return middles[..., None, :] + circles[..., None, None] * directions
 

@@ -10,7 +10,7 @@ from contactsafe.tasks.base.pushes import Pushes
 
 @dataclass(frozen=True)
 class TaskConfig:
-    """Settings that all tasks share; a task's own configuration extends them.
+    """Settings that all tasks have; a task's own configuration extends them.
 
     Attributes:
         episode_s: time limit, s.

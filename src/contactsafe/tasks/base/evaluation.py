@@ -95,7 +95,7 @@ def evaluate_policy(
 
 
 class _Run:
-    """An evaluation under way."""
+    """An evaluation that is running."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""N tasks of a kind stepped together: what every task shares, and what each supplies."""
+"""N tasks of a kind stepped together: what all tasks have, and what each supplies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar

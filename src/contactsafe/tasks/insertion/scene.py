@@ -34,7 +34,7 @@ PEG = Tool(
     capsules=HAND.capsules[:1],
     tip=Tip((PEG_RADIUS, PEG_RADIUS, _PEG_HALF_LENGTH), "cylinder"),
 )
-"""The gripper holding a steel peg of 20 mm diameter, 60 mm long; the TCP is the middle of its lower face."""
+"""The gripper with a steel peg of 20 mm diameter, 60 mm long; the TCP is the middle of its lower face."""
 
 
 def block(mouth: Vector3, clearance_m: float) -> Fixture:

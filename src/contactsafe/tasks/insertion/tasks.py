@@ -21,7 +21,7 @@ from contactsafe.tasks.insertion.scene import PEG, PEG_RADIUS, block, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
 _STEEL = TipSurface(friction=0.3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
-"""Steel held between rubber finger tips, which give way: 10 kN/m beneath the arm's 4 kg."""
+"""Steel between rubber finger tips, which yield: 10 kN/m beneath the arm's 4 kg."""
 
 
 class InsertionTasks(Tasks):
