@@ -63,8 +63,9 @@ class Arm(Independent):
         torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
-        description: what the model was generated from; None for a user's own.
-        tool: what the flange carries; None for a user's own.
+        description: what the model was generated from, or for a user's own what was derived from it; None where
+            nobody says.
+        tool: what the flange carries; None likewise.
         surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.

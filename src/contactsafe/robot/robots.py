@@ -1,13 +1,13 @@
 """The robots this package knows by name, and the one in a user's own MJCF."""
 
 from contactsafe.robot.arm import Arm, arm_from_description
-from contactsafe.robot.description import Tool
+from contactsafe.robot.description import Tip, Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.user_mjcf import from_mjcf
 
-__all__ = ["HAND", "WIPER", "fr3", "from_mjcf", "panda"]
+__all__ = ["HAND", "WIPER", "Tip", "Tool", "fr3", "from_mjcf", "panda"]
 
 
 def panda(tool: Tool = WIPER) -> Arm:

@@ -23,7 +23,7 @@ from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, numbers
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.scene import build_plant, loaded, perturbed
+from contactsafe.sim.scene import build_plant, described, loaded, perturbed
 
 GEAR = 1000.0
 """Turns of a rotor for one of its joint."""
@@ -107,7 +107,7 @@ class BulletBackend(Unique):
     """Arm and fixtures in a PyBullet client of their own; see `contactsafe.sim.backend`.
 
     Args:
-        arm: built from a description, with a tool.
+        arm: with a description and a tool.
         config: plant errors, fixtures; obstacles are not built.
         tick_s: time step, s.
 
@@ -122,18 +122,15 @@ class BulletBackend(Unique):
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()
-        if arm.description is None or arm.tool is None:
-            raise InvalidInputError(
-                f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda()"
-            )
+        description, tool = described(arm)
         if config.obstacles:
             raise InvalidInputError(
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
             )
         self._config, self._tick_s, self._n = config, tick_s, arm.n
-        self._tcp = np.array(arm.tool.tcp)
-        self._description = perturbed(arm.description, config.plant)
-        self._urdf = bullet_urdf(self._description, loaded(arm.tool, config.plant))
+        self._tcp, self._gravity = np.array(tool.tcp), arm.model.opt.gravity.tolist()
+        self._description = perturbed(description, config.plant)
+        self._urdf = bullet_urdf(self._description, loaded(tool, config.plant))
         # MuJoCo's copy of the arm says where its points are and what Jacobians they have.
         self._model = build_plant(arm, config)
         self._data = mujoco.MjData(self._model)
@@ -148,7 +145,7 @@ class BulletBackend(Unique):
         """Put the arm at rest at q (n,) rad, in a world built anew."""
         bullet, client = self._bullet, self._client
         bullet.resetSimulation(physicsClientId=client)
-        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        bullet.setGravity(*self._gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=self._tick_s, numSolverIterations=_ITERATIONS, solverResidualThreshold=0.0,
             deterministicOverlappingPairs=1, physicsClientId=client,

@@ -92,7 +92,7 @@ class Worlds(Independent):
     A copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
-        arm: built from a description, with a tool.
+        arm: with a description and a tool, such as `robots.panda()` or one of `robots.from_mjcf`.
         world: plant, sensors, fixtures, obstacles; one for all, or one for each.
         controller: a preset or another configuration, the same for all.
         n: how many.
@@ -306,7 +306,7 @@ class Worlds(Independent):
 
         Args:
             i: which world.
-            body: 'link1' … 'link7' or 'tool'.
+            body: 'link1' … 'link<n>' or 'tool'.
             point: in the body's frame, (3,), m.
             force: world axes, (3,), N.
             start_s, stop_s: since reset, s.
