@@ -15,10 +15,11 @@ import numpy as np
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.arm import Arm, finite_array, finite_range
-from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
+from contactsafe.robot.binding import actuator_of, torque_per_control
 from contactsafe.robot.bodies import inertia_of, link_of, shown_by
 from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
+from contactsafe.robot.names import JOINT, SITE, find, label, listed
 from contactsafe.robot.surface import geom_surface
 
 _BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY

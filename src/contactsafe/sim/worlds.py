@@ -296,7 +296,16 @@ class Worlds(Independent):
             self.backends[i].place_fixture(name, np.asarray(position, float), np.asarray(quat, float))
 
     def set_tip_friction(self, i: int, friction: float) -> None:
-        """Give the tip of world i's tool another Coulomb coefficient; reset the world next."""
+        """Give the tip of world i's tool another Coulomb coefficient; reset the world next.
+
+        Raises:
+            InvalidInputError: it has no tip.
+        """
+        if self.arm.tool is None or self.arm.tool.tip is None:
+            raise InvalidInputError(
+                f"arm '{self.arm.name}' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
+                "tip=robots.Tip(...))"
+            )
         self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
         if self.backends:
             self.backends[i].set_tip_friction(friction)
