@@ -60,15 +60,17 @@ def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
         tool: what its flange carries.
 
     Returns:
-        XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` …, massless but for what
-        `BulletBackend` gives them, and `tip`, fixed to the tool.
+        XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` … where there is a rotor,
+        massless but for what `BulletBackend` gives them, and `tip`, fixed to the tool.
     """
     robot = ET.fromstring(arm_urdf(description, replace(tool, tip=None)))
     for link in robot.iter("link"):
         if link.get("name") in (BASE_LINK, TIP_LINK):
             _inertial(link, 0.0)  # left out, Bullet would take 1 kg
     origins = {joint.get("name"): joint.find("origin") for joint in robot.iter("joint")}
-    for index in range(1, len(description.links) + 1):
+    for index, inertia in enumerate(description.joint_array("armature"), start=1):
+        if inertia == 0.0:
+            continue
         _inertial(ET.SubElement(robot, "link", name=f"rotor{index}"), _ROTOR_KG)
         rotor = ET.SubElement(robot, "joint", name=f"rotor_joint{index}", type="continuous")
         _connect(rotor, origins[f"joint{index}"], f"link{index - 1}", f"rotor{index}")
@@ -152,8 +154,9 @@ class BulletBackend(Unique):
         )  # fmt: skip
         self._build_arm()
         self._build_fixtures()
-        for joint, rotor, angle in zip(self._joints, self._rotors, q, strict=True):
+        for joint, angle in zip(self._joints, q, strict=True):
             bullet.resetJointState(self._arm, joint, float(angle), 0.0, physicsClientId=client)
+        for rotor in self._rotors:
             bullet.resetJointState(self._arm, rotor, 0.0, 0.0, physicsClientId=client)
 
     def read(self, world: np.void) -> None:
@@ -233,13 +236,13 @@ class BulletBackend(Unique):
             )  # fmt: skip
         names = range(1, self._n + 1)
         self._joints = [joints[f"joint{i}"] for i in names]
-        self._rotors = [joints[f"rotor_joint{i}"] for i in names]
+        geared = [i for i in names if f"rotor_joint{i}" in joints]
+        self._rotors = [joints[f"rotor_joint{i}"] for i in geared]
         moving = sorted(self._joints + self._rotors)
         zeros = [0.0] * len(moving)
         bullet.setJointMotorControlArray(arm, moving, bullet.VELOCITY_CONTROL, forces=zeros, physicsClientId=client)
-        for joint, rotor, inertia in zip(
-            self._joints, self._rotors, self._description.joint_array("armature"), strict=True
-        ):
+        for i, rotor in zip(geared, self._rotors, strict=True):
+            joint, inertia = self._joints[i - 1], self._description.links[i - 1].joint.armature
             # Bullet's reader takes so small an inertia for none, so it is given here.
             bullet.changeDynamics(
                 arm, rotor, mass=_ROTOR_KG, localInertiaDiagonal=[inertia / GEAR**2] * 3, physicsClientId=client
