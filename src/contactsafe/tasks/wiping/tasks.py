@@ -62,10 +62,10 @@ class WipingTasks(Tasks):
         return self.config.randomisation is not None
 
     def reached(self) -> tuple[Pose, ...]:
-        """Return the corners of where the tool may start."""
+        """Return a grid of where the tool may start."""
         reach, centre = self.config.start_reach, np.array(self.config.board.centre)
-        corners = itertools.product((-reach, reach), (-reach, reach), self.config.start_height)
-        return tuple(Pose(centre + corner, DOWN) for corner in corners)
+        grid = itertools.product((-reach, 0.0, reach), (-reach, 0.0, reach), self.config.start_height)
+        return tuple(Pose(centre + offset, DOWN) for offset in grid)
 
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with the board in it."""
