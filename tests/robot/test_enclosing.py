@@ -56,7 +56,9 @@ def standing_out(capsule, points):
 
 
 def volume(capsule):
-    return np.pi * capsule.radius**2 * (np.linalg.norm(np.subtract(capsule.end, capsule.start)) + 4 / 3 * capsule.radius)
+    return (
+        np.pi * capsule.radius**2 * (np.linalg.norm(np.subtract(capsule.end, capsule.start)) + 4 / 3 * capsule.radius)
+    )
 
 
 @pytest.mark.parametrize("kind", ["SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX"])

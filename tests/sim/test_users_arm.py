@@ -96,6 +96,7 @@ def test_friction_of_a_tip_that_is_not_there_is_refused():
     with pytest.raises(InvalidInputError) as caught:
         worlds.set_tip_friction(0, 0.4)
     assert str(caught.value) == (
-        "arm 'own scene' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., tip=robots.Tip(...))"
+        "arm 'own scene' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
+        "tip=robots.Tip(...))"
     )
     worlds.close()

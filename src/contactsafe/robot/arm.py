@@ -106,8 +106,9 @@ class Arm(Independent):
         """Find this arm's joints and motors, by the joints' names, and its wrist sensors in the model of a whole scene.
 
         One tick of a MuJoCo loop is then `measured = Measurement(data.qpos[at.qpos], data.qvel[at.dof])`, the
-        controller's step, `data.ctrl[at.ctrl] = out.torque / at.gear`, `mj_step(model, data, at.steps)`. Where force and
-        torque sensors stand between the last joint and the tool, `at.wrench(data)` is the measurement's `wrench_ee`.
+        controller's step, `data.ctrl[at.ctrl] = out.torque / at.gear`, `mj_step(model, data, at.steps)`. Where
+        force and torque sensors stand between the last joint and the tool, `at.wrench(data)` is the
+        measurement's `wrench_ee`.
 
         Args:
             model: of the scene.

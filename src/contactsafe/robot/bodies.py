@@ -38,7 +38,7 @@ def shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
 
 
 def base_bodies(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    """Return which bodies are the arm's base, (nbody,) bool: those between the world and link 1, and what is fixed to them."""
+    """Return which bodies are the base, (nbody,) bool: all between the world and link 1, and what is fixed to them."""
     base, body = np.zeros(model.nbody, dtype=bool), model.body_parentid[model.jnt_bodyid[chain[0]]]
     while body != 0:
         base[body] = True

@@ -155,7 +155,8 @@ def _capsules(found: Found, part: np.ndarray, frame: Frame, tip: Tip | None = No
 
 def _is_covered(points: np.ndarray, radius: float, tip: Tip) -> bool:
     half = np.array(tip.half_size)
-    beyond = np.abs(points + (0.0, 0.0, half[2])) + radius - half
+    centre = np.array([0.0, 0.0, -half[2]])
+    beyond = np.abs(points - centre) + radius - half
     return bool((beyond < _COVERED).all())
 
 

@@ -61,7 +61,7 @@ def placed(hull: Hull, position: np.ndarray, rotation: np.ndarray) -> Hull:
 
 
 def enclosing_capsule(hull: Hull) -> Capsule:
-    """Return the capsule of least volume about a shape, of those along its axes and through the middle of its extent."""
+    """Return the capsule of least volume about a shape, of those along its axes through the middle of its extent."""
     return min((_along(hull, axis) for axis in hull.axes), key=lambda found: found[0])[1]
 
 
@@ -85,14 +85,15 @@ def _along(hull: Hull, axis: np.ndarray) -> tuple[float, Capsule]:
     radius = r[:, 0] + hull.radius
     volume = np.pi * radius**2 * (last - first + 4 / 3 * radius)
     k = int(np.argmin(volume))
-    ends = [middle + (0.0, 0.0, end) for end in (first[k], last[k])]
-    return float(volume[k]), capsule_between(frame @ ends[0], frame @ ends[1], float(radius[k]))
+    centre = frame @ middle
+    return float(volume[k]), capsule_between(centre + first[k] * axis, centre + last[k] * axis, float(radius[k]))
 
 
 def capsule_between(start: np.ndarray, end: np.ndarray, radius: float) -> Capsule:
     """Return a capsule between two points (3,), m, made as long as MuJoCo needs it."""
     if np.linalg.norm(end - start) < 2 * _SHORT:
-        start, end = start - (0.0, 0.0, _SHORT), end + (0.0, 0.0, _SHORT)
+        along_z = np.array([0.0, 0.0, _SHORT])
+        start, end = start - along_z, end + along_z
     return Capsule(tuple(start.tolist()), tuple(end.tolist()), radius)
 
 

@@ -1,4 +1,4 @@
-"""The wrench on the tool from MuJoCo's sensors at the wrist: what is left once the tool's weight and inertia are out."""
+"""The wrench on the tool from MuJoCo's sensors at the wrist: what is left without the tool's weight and inertia."""
 
 from typing import NamedTuple
 

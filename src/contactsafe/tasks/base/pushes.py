@@ -54,7 +54,9 @@ class PushSchedule(Independent):
     def __init__(self, worlds: Worlds, pushes: Pushes):
         n = worlds.arm.n
         if max(pushes.links) > n:
-            raise InvalidInputError(f"pushes links = {pushes.links}; arm '{worlds.arm.name}' has {n}, give some of those")
+            raise InvalidInputError(
+                f"pushes links = {pushes.links}; arm '{worlds.arm.name}' has {n}, give some of those"
+            )
         self._worlds, self._pushes = worlds, pushes
         self.rngs = [np.random.default_rng(0) for _ in range(worlds.n)]
 

@@ -122,7 +122,7 @@ class Tasks(Independent):
         return robots.panda()
 
     def reached(self) -> Sequence[Pose]:
-        """Return poses of the tool without which the task makes no sense; an arm that does not reach them is refused."""
+        """Return poses of the tool that the task needs; an arm that does not reach them is refused."""
         return ()
 
     def furnish(self, world: WorldConfig) -> WorldConfig:
@@ -199,8 +199,8 @@ class Tasks(Independent):
         except UnreachableError:
             where = ", ".join(f"{x:.3f}" for x in pose.position)
             raise UnreachableError(
-                f"task '{self.name}' needs the tool at [{where}] m, pointing down, where arm '{self.arm.name}' does not "
-                f"reach; change {self.place} of {self.config_type.__name__}, or give the arm another base"
+                f"task '{self.name}' needs the tool at [{where}] m, pointing down, where arm '{self.arm.name}' does "
+                f"not reach; change {self.place} of {self.config_type.__name__}, or give the arm another base"
             ) from None
 
     def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
