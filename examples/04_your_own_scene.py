@@ -27,6 +27,7 @@ def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[np.ndarray,
     model = mujoco.MjModel.from_xml_path(str(SCENE))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_forward(model, data)
 
     arm = cs.robots.from_mjcf(SCENE, site="tip")
     at = arm.bind(model)
@@ -36,7 +37,7 @@ def collide(config: cs.ControllerConfig, ticks: int = 3000) -> tuple[np.ndarray,
 
     force = np.zeros(ticks)
     for tick in range(ticks):
-        measured = cs.Measurement(data.qpos[at.qpos], data.qvel[at.dof])
+        measured = cs.Measurement(data.qpos[at.qpos], data.qvel[at.dof], at.wrench(data))
         out = controller.step(measured, sweep(start, tick))
         data.ctrl[at.ctrl] = out.torque / at.gear
         mujoco.mj_step(model, data, at.steps)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.robot.worlds import BALL_SHOULDER, ELBOW, SIX, cell
+from tests.robot.worlds import BALL_SHOULDER, ELBOW, MESH_JOINTS, MESHES, SIX, cell
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot import robots
@@ -24,6 +24,7 @@ SCENES = {
     "panda in a cell": (cell, "left/tcp", None),
     "panda on its head": (lambda: cell((0.0, 0.0, 2.0), (0.0, 1.0, 0.0, 0.0)), "left/tcp", PANDA_JOINTS),
     "six beside a panda": (cell, "tip", None),
+    "meshes": (lambda: mujoco.MjModel.from_xml_string(MESHES), "tip", MESH_JOINTS),
     "nothing falls": (lambda: edited(ELBOW, "<worldbody>", '<option><flag gravity="disable"/></option><worldbody>'),
                       "tip", None),
 }  # fmt: skip

@@ -101,3 +101,58 @@ def cell(base=(0.4, -0.3, 0.8), turn=(0.9, 0.1, -0.3, 0.2)) -> mujoco.MjModel:
     q[[model.joint(f"left/finger{side}").qposadr[0] for side in ("-1", "+1")]] = 0.03
     scene.add_key(name="home", qpos=q)
     return scene.compile()
+
+
+MESHES = """
+<mujoco model="hulls">
+  <compiler angle="radian"/>
+  <default><joint range="-2.5 2.5" armature="0.05"/></default>
+  <asset>
+    <mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.08 0  0 0 0.3  0.05 0.02 0.28  0.1 0.01 0.02"/>
+    <mesh name="stone" vertex="-0.04 0 0  0.05 0.01 0  0 0.06 0.01  0 -0.05 0.02  0.01 0 0.07  0 0.01 -0.03"/>
+  </asset>
+  <worldbody>
+    <body name="stand" pos="-0.2 0.1 0.05" euler="0.1 -0.2 0.7">
+      <geom type="cylinder" size="0.07 0.1"/>
+      <geom type="ellipsoid" size="0.05 0.12 0.07" pos="0 0 0.1"/>
+      <body name="cable_duct" pos="0 0.1 0"><geom type="box" size="0.02 0.03 0.04" euler="0.4 0.2 0"/></body>
+      <body pos="0 0 0.2">
+        <joint name="j1" axis="0 0 1"/><geom type="mesh" mesh="wedge"/>
+        <body pos="0 0 0.3" euler="0.5 0 0.2">
+          <joint name="j2" axis="0 1 0"/><geom type="mesh" mesh="stone" euler="0.3 0 0"/>
+          <geom type="mesh" mesh="wedge" contype="0" conaffinity="0" pos="0 0.3 0"/>
+          <body pos="0.2 0 0.1">
+            <joint name="j3" axis="1 0.3 0"/><geom type="ellipsoid" size="0.03 0.05 0.12" pos="0 0 0.1"/>
+            <body pos="0 0 0.25">
+              <joint name="j4" axis="0 0 1" ref="0.4"/><geom type="box" size="0.03 0.05 0.08"/>
+              <body pos="0 0.05 0.1">
+                <joint name="j5" axis="0 1 0"/><geom type="sphere" size="0.04"/><geom type="cylinder" size="0.03 0.05"/>
+                <body pos="0.06 0 0.1">
+                  <joint name="j6" axis="0 0.2 1"/><geom type="cylinder" size="0.05 0.01"/>
+                  <body pos="0 0 0.06">
+                    <joint name="j7" axis="1 0 0"/><geom type="capsule" size="0.03" fromto="0 0 0 0 0.02 0.03"/>
+                    <body name="gripper" pos="0 0 0.06" euler="0 0 0.5">
+                      <geom type="box" size="0.02 0.05 0.03"/>
+                      <body name="jaw" pos="0 0.03 0.05"><joint name="jaw" type="slide" axis="0 1 0"/>
+                        <geom type="mesh" mesh="stone"/></body>
+                      <site name="tip" pos="0 0 0.12" euler="0.2 0.1 0.4"/>
+                    </body>
+                  </body>
+                </body>
+              </body>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="j1" ctrlrange="-90 90"/><motor joint="j2" ctrlrange="-90 90"/><motor joint="j3" ctrlrange="-90 90"/>
+    <motor joint="j4" ctrlrange="-90 90"/><motor joint="j5" ctrlrange="-40 40"/><motor joint="j6" ctrlrange="-40 40"/>
+    <motor joint="j7" ctrlrange="-40 40"/>
+  </actuator>
+</mujoco>
+"""
+"""Seven joints on a tilted stand, with geoms of every type, meshes that collide and one that does not."""
+
+MESH_JOINTS = [f"j{i}" for i in range(1, 8)]

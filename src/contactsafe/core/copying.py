@@ -14,7 +14,7 @@ from contactsafe.core.errors import InvalidInputError
 
 
 class Independent:
-    """An object whose copies have nothing in common with it, be they shallow, deep or pickled, and go on from where it is.
+    """An object whose copies are apart from it, be they shallow, deep or pickled, and go on from where it is.
 
     Subclasses name in `_bound` the attributes that are worth nothing elsewhere and make them in `_bind`, which their
     constructor calls as its last act and every copy as its first.

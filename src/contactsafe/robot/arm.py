@@ -16,6 +16,7 @@ from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 from contactsafe.robot.surface import SURFACE_COLUMNS, capsule_surface
+from contactsafe.robot.wrist import WristNames
 
 
 class Pose(NamedTuple):
@@ -64,8 +65,9 @@ class Arm(Independent):
         torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
-        description: what the model was generated from; None for a user's own.
-        tool: what the flange carries; None for a user's own.
+        description: what the model was generated from, or for a user's own what was derived from it; None where
+            nobody says.
+        tool: what the flange carries; None likewise.
         surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
@@ -101,21 +103,25 @@ class Arm(Independent):
         """Number of joints."""
         return int(self.model.nv)
 
-    def bind(self, model: mujoco.MjModel, tick_s: float = 0.001) -> Binding:
-        """Find this arm's joints and motors, by the joints' names, in the model of a whole scene.
+    def bind(self, model: mujoco.MjModel, tick_s: float = 0.001, wrist: WristNames | None = None) -> Binding:
+        """Find this arm's joints and motors, by the joints' names, and its wrist sensors in the model of a whole scene.
 
         One tick of a MuJoCo loop is then `measured = Measurement(data.qpos[at.qpos], data.qvel[at.dof])`, the
-        controller's step, `data.ctrl[at.ctrl] = out.torque / at.gear`, `mj_step(model, data, at.steps)`.
+        controller's step, `data.ctrl[at.ctrl] = out.torque / at.gear`, `mj_step(model, data, at.steps)`. Where
+        force and torque sensors stand between the last joint and the tool, `at.wrench(data)` is the
+        measurement's `wrench_ee`.
 
         Args:
             model: of the scene.
             tick_s: the controller's tick, `ControllerConfig.clock.dt`, s.
+            wrist: names of the sensors; None for those that are found.
 
         Raises:
-            InvalidInputError: a joint is missing, has not exactly one motor, or the timestep does not divide the tick.
+            InvalidInputError: a joint is missing, has not exactly one motor, the timestep does not divide the tick, or
+                a sensor that was named is not there.
         """
         names = [self.model.joint(i).name for i in range(self.n)]
-        return bind_joints(names, model, tick_s)
+        return bind_joints(names, self.site, model, tick_s, wrist)
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""

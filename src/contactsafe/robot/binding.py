@@ -1,15 +1,14 @@
-"""Where an arm's joints and motors are in a MuJoCo model that holds other things too."""
+"""Where an arm's joints, motors and wrist sensors are in a MuJoCo model that holds other things too."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-
-JOINT, SITE, ACTUATOR = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_ACTUATOR
-_LISTED = 12  # names that a message lists
+from contactsafe.robot.names import ACTUATOR, JOINT, find, label, listed
+from contactsafe.robot.wrist import Wrist, WristNames, find_wrist
 
 
 class Binding(NamedTuple):
@@ -21,6 +20,7 @@ class Binding(NamedTuple):
         ctrl: controls are `data.ctrl[ctrl]`, (n,).
         gear: joint torque of one unit of control, (n,), N m: `data.ctrl[ctrl] = torque / gear`.
         steps: calls of `mj_step` that make one tick.
+        wrist: the sensors at the wrist, or why there are none.
     """
 
     qpos: np.ndarray
@@ -28,10 +28,26 @@ class Binding(NamedTuple):
     ctrl: np.ndarray
     gear: np.ndarray
     steps: int
+    wrist: Wrist | str
+
+    def wrench(self, data: mujoco.MjData) -> np.ndarray:
+        """Return the environment's wrench on the tool as the sensors at the wrist say, for `Measurement`; see `Wrist`.
+
+        Args:
+            data: of the model that the arm was bound to, after a step or `mj_forward`.
+
+        Raises:
+            InvalidInputError: the model has no such sensors.
+        """
+        if isinstance(self.wrist, str):
+            raise InvalidInputError(self.wrist)
+        return self.wrist.wrench(data)
 
 
-def bind_joints(names: Sequence[str], model: mujoco.MjModel, tick_s: float) -> Binding:
-    """Find joints and their motors in a model; see `Arm.bind`."""
+def bind_joints(
+    names: Sequence[str], site: str, model: mujoco.MjModel, tick_s: float, wrist: WristNames | None
+) -> Binding:
+    """Find joints, their motors and the sensors at the wrist in a model; see `Arm.bind`."""
     joints = [find(model, JOINT, name) for name in names]
     motors = [_motor_of(model, joint) for joint in joints]
     steps = round(tick_s / model.opt.timestep)
@@ -46,35 +62,18 @@ def bind_joints(names: Sequence[str], model: mujoco.MjModel, tick_s: float) -> B
         ctrl=model.actuator_ctrladr[motors].astype(int),
         gear=np.array([torque_per_control(model, motor) for motor in motors]),
         steps=steps,
+        wrist=_wrist(model, names[-1], site, wrist),
     )
 
 
-def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Return the number of a named thing.
-
-    Raises:
-        InvalidInputError: there is none of that name.
-    """
-    found = mujoco.mj_name2id(model, kind, str(name))
-    if found < 0:
-        word = kind.name.removeprefix("mjOBJ_").lower()
-        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.nactuator}[kind]
-        names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-        raise InvalidInputError(f"{word} '{name}' is not in the model; give one of: {listed(filter(None, names))}")
-    return found
-
-
-def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
-    """Name a thing for a message: by its name, or by its number where it has none."""
-    name = mujoco.mj_id2name(model, kind, number)
-    return f"'{name}'" if name else f"{number} (without a name)"
-
-
-def listed(names: Iterable[object]) -> str:
-    """Write names for a message, the first dozen of them."""
-    words = [str(name) for name in names]
-    more = f" and {len(words) - _LISTED} more" if len(words) > _LISTED else ""
-    return ", ".join(words[:_LISTED]) + more or "none"
+def _wrist(model: mujoco.MjModel, last_joint: str, site: str, names: WristNames | None) -> Wrist | str:
+    """Find the sensors at the wrist; where none were named there may be none, and the reason is for who asks."""
+    try:
+        return find_wrist(model, last_joint, site, names or WristNames())
+    except InvalidInputError as error:
+        if names is not None:
+            raise
+        return str(error)
 
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:

@@ -101,7 +101,7 @@ class InverseKinematics(Independent):
         """Find joint positions within the limits that put the tool at a pose, however long it takes.
 
         Tries the compiled solver from `q_seed`, so a near seed gives a near answer; then `posture`; then home and other
-        fixed seeds; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm was built from a
+        fixed seeds; then TRAC-IK (Beeson & Ames 2015), where it is installed and the arm has a
         description. The same call on the same arm gives the same answer, unless it was TRAC-IK's,
         whose search is random.
 
@@ -187,7 +187,7 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02) -> Any:
     """Set up TRAC-IK (Beeson & Ames 2015, Speed mode) on the generated URDF, with the arm's limits.
 
     Args:
-        arm: built from a description.
+        arm: with a description.
         timeout_s: how long one call may search, s.
 
     Returns:
@@ -198,7 +198,8 @@ def trac_ik(arm: Arm, timeout_s: float = 0.02) -> Any:
         return None
     with readable("arm.urdf", arm_urdf(arm.description, arm.tool)) as path:  # it is read once
         solver = TracIK(BASE_LINK, TIP_LINK, str(path), timeout=timeout_s)
-    solver.joint_limits = (arm.q_min.tolist(), arm.q_max.tolist())  # its URDF reader rounds them to single precision
+    low, high = finite_range(arm.q_min, arm.q_max)
+    solver.joint_limits = (low.tolist(), high.tolist())  # its URDF reader rounds them to single precision
     return solver
 
 

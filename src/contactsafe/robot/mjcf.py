@@ -1,5 +1,6 @@
 """MJCF generated from an arm's description: the same arm for the nominal model, the plant and the pictures."""
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
@@ -45,7 +46,7 @@ def arm_default() -> ET.Element:
 
 
 def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
-    """Build the body tree of an arm with its tool, base at the world origin.
+    """Build the body tree of an arm with its tool, base frame at the world origin.
 
     Bodies are `link0` … `link<n>` and `tool`; joints `joint1` …; sites `flange` (in `tool`, at the mount) and `tcp`.
     """
@@ -56,14 +57,11 @@ def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
     for index, link in enumerate(description.links, start=1):
         parent = ET.SubElement(parent, "body", name=f"link{index}", pos=numbers(link.position), quat=numbers(link.quat))
         _inertial(parent, link.inertia)
-        ET.SubElement(
-            parent,
-            "joint",
-            name=f"joint{index}",
-            axis="0 0 1",
-            range=numbers((link.joint.q_min, link.joint.q_max)),
-            armature=numbers([link.joint.armature]),
+        joint = ET.SubElement(
+            parent, "joint", name=f"joint{index}", axis="0 0 1", armature=numbers([link.joint.armature])
         )
+        if math.isfinite(link.joint.q_min):
+            joint.set("range", numbers((link.joint.q_min, link.joint.q_max)))
         _capsules(parent, f"link{index}", link.capsules)
     mount = ET.SubElement(
         parent, "body", name="tool", pos=numbers(description.mount_position), quat=numbers(description.mount_quat)

@@ -1,13 +1,14 @@
-"""The robots this package knows by name, and the one in a user's own MJCF."""
+"""The robots this package knows by name, the one in a user's own MJCF, and what that may be told."""
 
 from contactsafe.robot.arm import Arm, arm_from_description
-from contactsafe.robot.description import Tool
+from contactsafe.robot.description import Tip, Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.user_mjcf import from_mjcf
+from contactsafe.robot.wrist import WristNames
 
-__all__ = ["HAND", "WIPER", "fr3", "from_mjcf", "panda"]
+__all__ = ["HAND", "WIPER", "Tip", "Tool", "WristNames", "fr3", "from_mjcf", "panda"]
 
 
 def panda(tool: Tool = WIPER) -> Arm:

@@ -6,6 +6,7 @@ import math
 import mujoco
 import numpy as np
 
+from contactsafe.robot.bodies import shown_geoms
 from contactsafe.robot.description import ArmDescription, Capsule
 
 SURFACE_COLUMNS = 7
@@ -67,9 +68,7 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
     seen.geom_matid[:], seen.geom_rgba[:, 3] = -1, 1.0  # rays pass through what is transparent
     found, rows = {}, [np.zeros((0, SURFACE_COLUMNS))]
     for link in range(2, len(origins) + 1):
-        geoms = np.flatnonzero(link_of[model.geom_bodyid] == link)
-        solid = geoms[(model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)]
-        if len(points := _surface(seen, data, solid if solid.size else geoms)):
+        if len(points := _surface(seen, data, shown_geoms(model, link_of == link))):
             found[link] = points
     for link, points in found.items():
         points = _spread(points, _POINTS // len(found))

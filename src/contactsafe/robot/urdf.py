@@ -11,6 +11,7 @@ from contactsafe.robot.mjcf import numbers
 
 BASE_LINK = "base"
 TIP_LINK = "tcp"
+_FAST = 1e3  # rad/s; URDF knows no infinity
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -36,9 +37,8 @@ def arm_urdf(description: ArmDescription, tool: Tool) -> str:
     _joint(robot, "base_mount", "fixed", (BASE_LINK, "link0"), (0.0, 0.0, 0.0), _UPRIGHT)
     for index, link in enumerate(description.links, start=1):
         _link(robot, f"link{index}", link.inertia, link.capsules)
-        joint = _joint(
-            robot, f"joint{index}", "revolute", (f"link{index - 1}", f"link{index}"), link.position, link.quat
-        )
+        kind = "revolute" if math.isfinite(link.joint.q_min) else "continuous"
+        joint = _joint(robot, f"joint{index}", kind, (f"link{index - 1}", f"link{index}"), link.position, link.quat)
         ET.SubElement(joint, "axis", xyz="0 0 1")
         _limit(joint, link.joint)
     mount = _link(robot, "tool", tool.inertia, tool.capsules)
@@ -103,12 +103,12 @@ def _joint(robot: ET.Element, name: str, kind: str, links: tuple[str, str], posi
 
 
 def _limit(parent: ET.Element, joint: Joint) -> None:
+    ends = {"lower": numbers([joint.q_min]), "upper": numbers([joint.q_max])} if math.isfinite(joint.q_min) else {}
     ET.SubElement(
         parent,
         "limit",
-        lower=numbers([joint.q_min]),
-        upper=numbers([joint.q_max]),
-        velocity=numbers([joint.qd_max]),
+        ends,
+        velocity=numbers([min(joint.qd_max, _FAST)]),
         effort=numbers([joint.tau_max]),
     )
 

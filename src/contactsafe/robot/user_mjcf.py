@@ -6,8 +6,6 @@ is fixed to it. Its frames lie at the joints and are parallel to the world's whi
 it; dynamics and the tool's pose do not depend on that choice.
 """
 
-import functools
-import operator
 import os
 from collections.abc import Sequence
 
@@ -18,14 +16,14 @@ from numpy.typing import ArrayLike
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.arm import Arm, finite_array, finite_range
-from contactsafe.robot.binding import JOINT, SITE, actuator_of, find, label, listed, torque_per_control
-from contactsafe.robot.description import Inertia
+from contactsafe.robot.binding import actuator_of, torque_per_control
+from contactsafe.robot.bodies import inertia_of, link_of, shown_by
+from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
+from contactsafe.robot.description import Inertia, Joint, Tip
+from contactsafe.robot.names import JOINT, SITE, find, label, listed
 from contactsafe.robot.surface import geom_surface
 
 _BODY, _KEY, _HINGE = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY, mujoco.mjtJoint.mjJNT_HINGE
-_NOTHING = 1e-12
-"""Mass, kg, and moment of inertia, kg m², of a body between two joints of one: MuJoCo takes no zero."""
-
 _LEVER_DOUBTED = 0.02
 """Of `Arm.lever_doubted`, m. Many arms are bent in one plane, where a push from the side fits points everywhere."""
 
@@ -42,6 +40,7 @@ def from_mjcf(
     torque_rate_max: float | None = None,
     friction: ArrayLike | None = None,
     home: ArrayLike | None = None,
+    tip: Tip | None = None,
 ) -> Arm:
     """Return the arm inside a user's own MJCF scene.
 
@@ -61,9 +60,12 @@ def from_mjcf(
         torque_rate_max: N m/s; None for the strongest motor's limit in 87 ms, as on a Panda, and at least 1000.
         friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3); None for none.
         home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
+        tip: the part of the tool that works, its face centred on the site; None where no part is meant to. It counts in
+            simulated worlds alone.
 
     Returns:
-        An arm without description and tool. Limits that the model does not give are inf, as those of speed.
+        An arm with the description and the tool that simulated worlds build it from. Limits that the model does not
+        give are inf, as those of speed.
 
     Raises:
         InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or does not move the
@@ -79,18 +81,24 @@ def from_mjcf(
     q_min, q_max = _joint_range(model, chain)
     limits = _torque_limits(model, chain, tau_max)
     data, key_home = _at_start(model, chain)
+    friction = np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction")
+    home = _home(key_home if home is None else home, q_min, q_max)
+    nominal, found = _nominal_model(model, data, chain, site_id, limits), Found(model, data, chain, site_id)
+    name, rate = model.names.split(b"\0")[0].decode(), _torque_rate(torque_rate_max, limits)
     return Arm(
-        name=model.names.split(b"\0")[0].decode(),
-        model=_nominal_model(model, data, chain, site_id, limits),
+        name=name,
+        model=nominal,
         site=site,
         q_min=q_min,
         q_max=q_max,
         qd_max=np.full(n, np.inf),
         tau_max=limits,
-        torque_rate_max=_torque_rate(torque_rate_max, limits),
-        friction=np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction"),
-        home=_home(key_home if home is None else home, q_min, q_max),
-        surface=geom_surface(model, data, _shown_by(model, chain), data.xanchor[chain]),
+        torque_rate_max=rate,
+        friction=friction,
+        home=home,
+        description=describe(found, name, _joints(nominal, q_min, q_max, limits, friction), rate, home),
+        tool=carried_tool(found, tip),
+        surface=geom_surface(model, data, shown_by(model, chain), data.xanchor[chain]),
         lever_doubted=_LEVER_DOUBTED,
     )
 
@@ -107,6 +115,17 @@ def _torque_rate(given: float | None, tau_max: np.ndarray) -> float:
     if not finite_array(given, (), "torque_rate_max") > 0.0:
         raise InvalidInputError(f"torque_rate_max = {given} must be greater than 0; give N m/s")
     return float(given)
+
+
+def _joints(
+    nominal: mujoco.MjModel, q_min: np.ndarray, q_max: np.ndarray, tau_max: np.ndarray, friction: np.ndarray
+) -> tuple[Joint, ...]:
+    """Return what the description says of each joint; the arguments have one row a joint."""
+    rows = zip(q_min, q_max, tau_max, friction, nominal.dof_armature, strict=True)
+    return tuple(
+        Joint(float(low), float(high), np.inf, float(most), tuple(phi.tolist()), float(rotor))
+        for low, high, most, phi, rotor in rows
+    )
 
 
 def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
@@ -182,29 +201,8 @@ def _joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     return joints
 
 
-def _link_of(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    """Tell which link each body is part of, (nbody,): 1 … n, 0 for what the arm does not move."""
-    moved_by = {int(model.jnt_bodyid[joint]): link for link, joint in enumerate(chain, start=1)}
-    link_of = np.zeros(model.nbody, dtype=int)
-    for body in range(1, model.nbody):
-        link_of[body] = moved_by.get(body, link_of[model.body_parentid[body]])
-    return link_of
-
-
-def _shown_by(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    """Tell whose surface each body's surface is, (nbody,): its link's, but what the last link carries is tool, 0.
-
-    Only where the last link's own body shows nothing, what it carries is taken for the link.
-    """
-    link_of, last = _link_of(model, chain), model.jnt_bodyid[chain[-1]]
-    if model.body_geomnum[last] > 0:
-        link_of[link_of == len(chain)] = 0
-        link_of[last] = len(chain)
-    return link_of
-
-
 def _refuse_weightless(model: mujoco.MjModel, chain: list[int]) -> None:
-    floating = np.flatnonzero((_link_of(model, chain) > 0) & (model.body_gravcomp != 0.0))
+    floating = np.flatnonzero((link_of(model, chain) > 0) & (model.body_gravcomp != 0.0))
     if floating.size:
         raise InvalidInputError(
             f"body {label(model, _BODY, floating[0])} has gravcomp = {model.body_gravcomp[floating[0]]:g}; "
@@ -274,12 +272,12 @@ def _nominal_model(
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
     spec.option.gravity = np.zeros(3) if weightless else model.opt.gravity
-    body, origin, link_of = spec.worldbody, np.zeros(3), _link_of(model, chain)
+    body, origin, links = spec.worldbody, np.zeros(3), link_of(model, chain)
     for link, (joint, limit) in enumerate(zip(chain, limits, strict=True), start=1):
         name = mujoco.mj_id2name(model, JOINT, joint)
         body = body.add_body(name=f"link{link}", pos=data.xanchor[joint] - origin)
         origin = data.xanchor[joint]
-        _set_inertia(body, _inertias(model, data, link_of == link, origin))
+        _set_inertia(body, inertia_of(model, data, links == link, origin))
         body.add_joint(
             name=name,
             type=_HINGE,
@@ -306,25 +304,14 @@ def _rotor(model: mujoco.MjModel, joint: int) -> float:
     return armature
 
 
-def _inertias(model: mujoco.MjModel, data: mujoco.MjData, part: np.ndarray, origin: np.ndarray) -> list[Inertia]:
-    """Return the inertia of bodies as they stand, in world axes and from an origin (3,), m; part: which, (nbody,)."""
-    found = []
-    for body in np.flatnonzero(part & (model.body_mass > 0.0)):
-        axes = data.ximat[body].reshape(3, 3)
-        tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
-        found.append(Inertia.of(float(model.body_mass[body]), data.xipos[body] - origin, tensor))
-    return found
-
-
-def _set_inertia(body, parts: list[Inertia]) -> None:
-    """Give a body of the canonical chain the mass of its parts, in principal axes."""
+def _set_inertia(body, total: Inertia | None) -> None:
+    """Set the mass of a body of the canonical chain, in principal axes."""
     body.explicitinertial = True
-    if not parts:
-        body.mass, body.inertia = _NOTHING, np.full(3, _NOTHING)
+    if total is None:
+        body.mass, body.inertia = NOTHING, np.full(3, NOTHING)
         return
-    total = functools.reduce(operator.add, parts)
     moments, axes = np.linalg.eigh(total.matrix())
     axes[:, 0] *= np.sign(np.linalg.det(axes))
-    moments = np.maximum(moments, _NOTHING)
+    moments = np.maximum(moments, NOTHING)
     moments[2] = min(moments[2], moments[0] + moments[1])  # rounding may exceed what MuJoCo allows a thin plate
     body.mass, body.ipos, body.iquat, body.inertia = total.mass, total.com, matrix_to_quat(axes), moments

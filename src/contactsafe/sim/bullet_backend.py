@@ -23,7 +23,7 @@ from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, numbers
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.scene import build_plant, loaded, perturbed
+from contactsafe.sim.scene import build_plant, described, loaded, perturbed
 
 GEAR = 1000.0
 """Turns of a rotor for one of its joint."""
@@ -60,15 +60,17 @@ def bullet_urdf(description: ArmDescription, tool: Tool) -> str:
         tool: what its flange carries.
 
     Returns:
-        XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` …, massless but for what
-        `BulletBackend` gives them, and `tip`, fixed to the tool.
+        XML text. Beyond those of `arm_urdf`: links `rotor1` … on joints `rotor_joint1` … where there is a rotor,
+        massless but for what `BulletBackend` gives them, and `tip`, fixed to the tool.
     """
     robot = ET.fromstring(arm_urdf(description, replace(tool, tip=None)))
     for link in robot.iter("link"):
         if link.get("name") in (BASE_LINK, TIP_LINK):
             _inertial(link, 0.0)  # left out, Bullet would take 1 kg
     origins = {joint.get("name"): joint.find("origin") for joint in robot.iter("joint")}
-    for index in range(1, len(description.links) + 1):
+    for index, inertia in enumerate(description.joint_array("armature"), start=1):
+        if inertia == 0.0:
+            continue
         _inertial(ET.SubElement(robot, "link", name=f"rotor{index}"), _ROTOR_KG)
         rotor = ET.SubElement(robot, "joint", name=f"rotor_joint{index}", type="continuous")
         _connect(rotor, origins[f"joint{index}"], f"link{index - 1}", f"rotor{index}")
@@ -107,7 +109,7 @@ class BulletBackend(Unique):
     """Arm and fixtures in a PyBullet client of their own; see `contactsafe.sim.backend`.
 
     Args:
-        arm: built from a description, with a tool.
+        arm: with a description and a tool.
         config: plant errors, fixtures; obstacles are not built.
         tick_s: time step, s.
 
@@ -122,18 +124,15 @@ class BulletBackend(Unique):
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()
-        if arm.description is None or arm.tool is None:
-            raise InvalidInputError(
-                f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda()"
-            )
+        description, tool = described(arm)
         if config.obstacles:
             raise InvalidInputError(
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
             )
         self._config, self._tick_s, self._n = config, tick_s, arm.n
-        self._tcp = np.array(arm.tool.tcp)
-        self._description = perturbed(arm.description, config.plant)
-        self._urdf = bullet_urdf(self._description, loaded(arm.tool, config.plant))
+        self._tcp, self._gravity = np.array(tool.tcp), arm.model.opt.gravity.tolist()
+        self._description = perturbed(description, config.plant)
+        self._urdf = bullet_urdf(self._description, loaded(tool, config.plant))
         # MuJoCo's copy of the arm says where its points are and what Jacobians they have.
         self._model = build_plant(arm, config)
         self._data = mujoco.MjData(self._model)
@@ -148,15 +147,16 @@ class BulletBackend(Unique):
         """Put the arm at rest at q (n,) rad, in a world built anew."""
         bullet, client = self._bullet, self._client
         bullet.resetSimulation(physicsClientId=client)
-        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        bullet.setGravity(*self._gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=self._tick_s, numSolverIterations=_ITERATIONS, solverResidualThreshold=0.0,
             deterministicOverlappingPairs=1, physicsClientId=client,
         )  # fmt: skip
         self._build_arm()
         self._build_fixtures()
-        for joint, rotor, angle in zip(self._joints, self._rotors, q, strict=True):
+        for joint, angle in zip(self._joints, q, strict=True):
             bullet.resetJointState(self._arm, joint, float(angle), 0.0, physicsClientId=client)
+        for rotor in self._rotors:
             bullet.resetJointState(self._arm, rotor, 0.0, 0.0, physicsClientId=client)
 
     def read(self, world: np.void) -> None:
@@ -236,13 +236,13 @@ class BulletBackend(Unique):
             )  # fmt: skip
         names = range(1, self._n + 1)
         self._joints = [joints[f"joint{i}"] for i in names]
-        self._rotors = [joints[f"rotor_joint{i}"] for i in names]
+        geared = [i for i in names if f"rotor_joint{i}" in joints]
+        self._rotors = [joints[f"rotor_joint{i}"] for i in geared]
         moving = sorted(self._joints + self._rotors)
         zeros = [0.0] * len(moving)
         bullet.setJointMotorControlArray(arm, moving, bullet.VELOCITY_CONTROL, forces=zeros, physicsClientId=client)
-        for joint, rotor, inertia in zip(
-            self._joints, self._rotors, self._description.joint_array("armature"), strict=True
-        ):
+        for i, rotor in zip(geared, self._rotors, strict=True):
+            joint, inertia = self._joints[i - 1], self._description.links[i - 1].joint.armature
             # Bullet's reader takes so small an inertia for none, so it is given here.
             bullet.changeDynamics(
                 arm, rotor, mass=_ROTOR_KG, localInertiaDiagonal=[inertia / GEAR**2] * 3, physicsClientId=client

@@ -17,7 +17,7 @@ from contactsafe.sim.obstacles import Obstacle
 
 
 def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
-    """Compile the world around an arm that was built from a description.
+    """Compile the world around an arm that has a description.
 
     Raises:
         InvalidInputError: the arm has no description to build a plant from.
@@ -27,22 +27,21 @@ def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
 
 def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     """Write the MJCF of the world around an arm."""
-    if arm.description is None or arm.tool is None:
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda()"
-        )
+    description, tool = described(arm)
     root = model_root("contactsafe world")
+    for option in root.iter("option"):
+        option.set("gravity", numbers(arm.model.opt.gravity))
     _visual(root)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0.6 -0.6 2", dir="0 0.3 -1", diffuse="0.7 0.7 0.7")
     for fixture in config.fixtures:
         _fixture(world, fixture)
-    world.append(arm_body(perturbed(arm.description, config.plant), loaded(arm.tool, config.plant)))
+    world.append(arm_body(perturbed(description, config.plant), loaded(tool, config.plant)))
     for index, obstacle in enumerate(config.obstacles):
         _obstacle(world, index, obstacle)
     tool_body = next(body for body in world.iter("body") if body.get("name") == "tool")
-    ET.SubElement(tool_body, "site", name="tool_com", pos=numbers(arm.tool.inertia.com))
-    if arm.tool.tip is not None:
+    ET.SubElement(tool_body, "site", name="tool_com", pos=numbers(tool.inertia.com))
+    if tool.tip is not None:
         tip = next(geom for geom in tool_body.iter("geom") if geom.get("name") == TIP_GEOM)
         tip.set("solref", numbers(config.tip.solref))
         tip.set("solimp", numbers(config.tip.solimp))
@@ -51,9 +50,23 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     actuator = ET.SubElement(root, "actuator")
     for index in range(1, arm.n + 1):
         ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}")
-    _sensors(root, arm, config)
+    _sensors(root, tool, config)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
+
+
+def described(arm: Arm) -> tuple[ArmDescription, Tool]:
+    """Return what an arm and its tool are built from.
+
+    Raises:
+        InvalidInputError: nobody says.
+    """
+    if arm.description is None or arm.tool is None:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda(), or one of "
+            "robots.from_mjcf"
+        )
+    return arm.description, arm.tool
 
 
 def perturbed(description: ArmDescription, plant: PlantConfig) -> ArmDescription:
@@ -128,13 +141,13 @@ def _obstacle(world: ET.Element, index: int, obstacle: Obstacle) -> None:
     )  # fmt: skip
 
 
-def _sensors(root: ET.Element, arm: Arm, config: WorldConfig) -> None:
+def _sensors(root: ET.Element, tool: Tool, config: WorldConfig) -> None:
     sensor = ET.SubElement(root, "sensor")
     ET.SubElement(sensor, "force", name="wrist_force", site=FLANGE_SITE)
     ET.SubElement(sensor, "torque", name="wrist_torque", site=FLANGE_SITE)
     ET.SubElement(sensor, "accelerometer", name="wrist_accelerometer", site="tool_com")
     for index, fixture in enumerate(config.fixtures):
-        if arm.tool is not None and arm.tool.tip is not None:
+        if tool.tip is not None:
             ET.SubElement(
                 sensor, "contact", name=f"tip_fixture{index}", body1=fixture.name, geom2=TIP_GEOM, reduce="netforce",
                 data="found force torque pos",

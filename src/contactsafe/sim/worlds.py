@@ -97,7 +97,7 @@ class Worlds(Independent):
     A copy, pickled or not, has worlds of its own and goes on from where these are.
 
     Args:
-        arm: built from a description, with a tool.
+        arm: with a description and a tool, such as `robots.panda()` or one of `robots.from_mjcf`.
         world: plant, sensors, fixtures, obstacles; one for all, or one for each.
         controller: a preset or another configuration, the same for all.
         n: how many.
@@ -301,7 +301,16 @@ class Worlds(Independent):
             self.backends[i].place_fixture(name, np.asarray(position, float), np.asarray(quat, float))
 
     def set_tip_friction(self, i: int, friction: float) -> None:
-        """Give the tip of world i's tool another Coulomb coefficient; reset the world next."""
+        """Give the tip of world i's tool another Coulomb coefficient; reset the world next.
+
+        Raises:
+            InvalidInputError: it has no tip.
+        """
+        if self.arm.tool is None or self.arm.tool.tip is None:
+            raise InvalidInputError(
+                f"arm '{self.arm.name}' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
+                "tip=robots.Tip(...))"
+            )
         self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
         if self.backends:
             self.backends[i].set_tip_friction(friction)
@@ -313,7 +322,7 @@ class Worlds(Independent):
 
         Args:
             i: which world.
-            body: 'link1' … 'link7' or 'tool'.
+            body: 'link1' … 'link<n>' or 'tool'.
             point: in the body's frame, (3,), m.
             force: world axes, (3,), N.
             start_s, stop_s: since reset, s.

@@ -1,4 +1,4 @@
-"""Tasks: what an arm is to learn. `base` is what they have in common; every other folder is one of them, and a line here."""
+"""Tasks: what an arm is to learn. `base` is common to all; every other folder is one of them, and a line here."""
 
 from contactsafe.tasks.base.registry import ENGINES, TASKS, import_task, make_vec, register_task, task_by_name
 

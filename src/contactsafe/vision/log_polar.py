@@ -1,4 +1,4 @@
-"""The camera's mask at a resolution that falls with distance: fine about the tool, coarse far off, and no speck too small to count.
+"""The camera's mask, fine about the tool and coarse far off, with no speck too small to count.
 
 What a wiping policy must read off the picture is where ink is from here. A grid in the camera's frame, or a small
 code of one, loses the last speck; a grid in the logarithm of the distance keeps it, and says direction and distance

@@ -46,9 +46,17 @@ class PushSchedule(Independent):
 
     Attributes:
         rngs: the generator of each world's episode.
+
+    Raises:
+        InvalidInputError: the arm has no such link.
     """
 
     def __init__(self, worlds: Worlds, pushes: Pushes):
+        n = worlds.arm.n
+        if max(pushes.links) > n:
+            raise InvalidInputError(
+                f"pushes links = {pushes.links}; arm '{worlds.arm.name}' has {n}, give some of those"
+            )
         self._worlds, self._pushes = worlds, pushes
         self.rngs = [np.random.default_rng(0) for _ in range(worlds.n)]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.core.copying import Independent
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, UnreachableError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, of_records, state_dict
 from contactsafe.policy.action import act
 from contactsafe.policy.action_config import ACTION_SIZE, action_limits
@@ -71,6 +71,9 @@ class Tasks(Independent):
     reset_options: ClassVar[tuple[str, ...]] = ()
     """Names of the options that `reset` takes."""
 
+    place: ClassVar[str] = "the place of work"
+    """Field of the configuration that says where the tool works, for messages."""
+
     start_info: ClassVar[dict[str, float]] = {}
     """What `info` says of an episode that begins."""
 
@@ -86,6 +89,9 @@ class Tasks(Independent):
         self.config = self._checked(config)
         self.arm = arm or self.default_arm()
         self._backend = backend
+        self._ik = InverseKinematics(self.arm)
+        for pose in self.reached():
+            self.posture_over(pose)
         controller = presets.by_name(self.config.controller)
         furnished = [self.furnish(world) for world in worlds or [self.config.world] * n]
         self.worlds = Worlds(self.arm, furnished, controller, n, seed, shared=not self.varies, backend=backend)
@@ -94,7 +100,6 @@ class Tasks(Independent):
         self.step_limit = round(self.config.episode_s * POLICY_RATE_HZ)
         self._limits = action_limits(self.config.action, self.centre)
         self._actions = np.zeros((n, ACTION_SIZE))
-        self._ik = InverseKinematics(self.arm)
         self._rule = posture_rule(self.arm)
         self._observed = tuple(vector.name for vector in self.observation_vectors)
         self.prepare()
@@ -115,6 +120,10 @@ class Tasks(Independent):
     def default_arm(self) -> Arm:
         """Return the arm that works where none is given."""
         return robots.panda()
+
+    def reached(self) -> Sequence[Pose]:
+        """Return poses of the tool that the task needs; an arm that does not reach them is refused."""
+        return ()
 
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with what the task needs in it."""
@@ -180,8 +189,19 @@ class Tasks(Independent):
         self.begun(i, rng)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
-        """Return the joint positions that go with a tool pose, those of the target's posture, (n,), rad."""
-        return self._ik.solve(pose)
+        """Return the joint positions that go with a tool pose, those of the target's posture, (n,), rad.
+
+        Raises:
+            UnreachableError: there are none.
+        """
+        try:
+            return self._ik.solve(pose)
+        except UnreachableError:
+            where = ", ".join(f"{x:.3f}" for x in pose.position)
+            raise UnreachableError(
+                f"task '{self.name}' needs the tool at [{where}] m, pointing down, where arm '{self.arm.name}' does "
+                f"not reach; change {self.place} of {self.config_type.__name__}, or give the arm another base"
+            ) from None
 
     def step(self, actions: np.ndarray, traces: np.ndarray | None = None) -> None:
         """Run one policy step in every task.

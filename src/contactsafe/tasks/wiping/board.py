@@ -61,5 +61,8 @@ def pad_half(arm: Arm) -> Vector3:
         InvalidInputError: its tool has no box for a tip.
     """
     if arm.tool is None or arm.tool.tip is None or arm.tool.tip.shape != "box":
-        raise InvalidInputError(f"arm '{arm.name}' has no pad to wipe with; give it the tool robots.WIPER")
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no pad to wipe with; give it a box for a tip: the tool robots.WIPER, or "
+            "robots.from_mjcf(..., tip=robots.Tip((0.02, 0.02, 0.01)))"
+        )
     return arm.tool.tip.half_size

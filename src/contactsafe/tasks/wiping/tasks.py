@@ -1,5 +1,6 @@
 """The wiping task: ink on a whiteboard, seen by a camera, to be wiped off gently."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -47,6 +48,7 @@ class WipingTasks(Tasks):
     reset_options = ("drawing", "start")
     episode_metrics = EPISODE_METRICS
     figures = FIGURES
+    place = "board.centre"
     start_info = {"ink_left": 1.0}
 
     @property
@@ -58,6 +60,12 @@ class WipingTasks(Tasks):
     def varies(self) -> bool:
         """Whether episodes change the worlds' models."""
         return self.config.randomisation is not None
+
+    def reached(self) -> tuple[Pose, ...]:
+        """Return a grid of where the tool may start."""
+        reach, centre = self.config.start_reach, np.array(self.config.board.centre)
+        grid = itertools.product((-reach, 0.0, reach), (-reach, 0.0, reach), self.config.start_height)
+        return tuple(Pose(centre + offset, DOWN) for offset in grid)
 
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with the board in it."""

@@ -10,6 +10,7 @@ import numpy as np
 from contactsafe.core.byte_scan import copy_picture, places_unlike
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, check_state_dict, load_state_dict, of_array, state_dict
 from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim.worlds import Worlds
@@ -37,6 +38,7 @@ class Variation(Independent):
     """
 
     def __init__(self, worlds: Worlds, boards: Whiteboards, ranges: Randomisation):
+        _refuse_too_light(worlds, ranges)
         self._worlds, self._boards, self._ranges = worlds, boards, ranges
         self.drawn = np.zeros(worlds.n, dtype=draw_dtype)
         self._plants = [_Plant(worlds, boards, i) for i in range(worlds.n)]
@@ -103,6 +105,16 @@ class Variation(Independent):
         self._boards.records[i]["camera"] = self.drawn[i]["camera"]
         self._boards.boards[i].changed = True  # as another camera sees it
         self._plants[i].apply(self.drawn[i])
+
+
+def _refuse_too_light(worlds: Worlds, ranges: Randomisation) -> None:
+    """Refuse to take more off a tool than its mass."""
+    tool, (low, high) = worlds.arm.tool, ranges.payload_kg
+    if tool is not None and low < 0.0 and low <= -tool.inertia.mass:
+        raise InvalidInputError(
+            f"randomisation payload_kg = ({low}, {high}) takes more than the {tool.inertia.mass:.2g} kg of tool "
+            f"'{tool.name}'; give (0.0, {high})"
+        )
 
 
 def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) -> Camera:

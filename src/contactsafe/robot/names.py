@@ -1,0 +1,37 @@
+"""Things in a MuJoCo model by their names, and their names in messages."""
+
+import mujoco
+
+from contactsafe.core.errors import InvalidInputError
+
+JOINT, SITE, ACTUATOR = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_ACTUATOR
+SENSOR = mujoco.mjtObj.mjOBJ_SENSOR
+_LISTED = 12  # names that a message lists
+
+
+def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Return the number of a named thing.
+
+    Raises:
+        InvalidInputError: there is none of that name.
+    """
+    found = mujoco.mj_name2id(model, kind, str(name))
+    if found < 0:
+        word = kind.name.removeprefix("mjOBJ_").lower()
+        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.nactuator, SENSOR: model.nsensor}[kind]
+        names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+        raise InvalidInputError(f"{word} '{name}' is not in the model; give one of: {listed(filter(None, names))}")
+    return found
+
+
+def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
+    """Name a thing for a message: by its name, or by its number where it has none."""
+    name = mujoco.mj_id2name(model, kind, number)
+    return f"'{name}'" if name else f"{number} (without a name)"
+
+
+def listed(names) -> str:
+    """Write names for a message, the first dozen of them."""
+    names = list(names)
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more or "none"
