@@ -1,7 +1,7 @@
 """The description of an arm that was found in a scene: what worlds, pictures and other engines build it from.
 
 Its frames lie at the joints with z along them, the base frame at the world's origin, and the tool's mount at the
-site. Where its joints are and what masses its bodies have is the scene's to rounding; its shape is capsules about the geoms.
+site. Joints and masses are the scene's to rounding; the shape is capsules about the geoms.
 """
 
 from typing import NamedTuple
@@ -52,7 +52,9 @@ class Found(NamedTuple):
     site: int
 
 
-def describe(found: Found, name: str, joints: tuple[Joint, ...], torque_rate_max: float, home) -> ArmDescription:
+def describe(
+    found: Found, name: str, joints: tuple[Joint, ...], torque_rate_max: float, home: np.ndarray
+) -> ArmDescription:
     """Return the description of an arm in a scene; what its last link carries is left out, see `carried_tool`.
 
     Args:

@@ -1,5 +1,7 @@
 """Things in a MuJoCo model by their names, and their names in messages."""
 
+from collections.abc import Iterable
+
 import mujoco
 
 from contactsafe.core.errors import InvalidInputError
@@ -30,8 +32,8 @@ def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
     return f"'{name}'" if name else f"{number} (without a name)"
 
 
-def listed(names) -> str:
+def listed(names: Iterable[object]) -> str:
     """Write names for a message, the first dozen of them."""
-    names = list(names)
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more or "none"
+    words = [str(name) for name in names]
+    more = f" and {len(words) - _LISTED} more" if len(words) > _LISTED else ""
+    return ", ".join(words[:_LISTED]) + more or "none"

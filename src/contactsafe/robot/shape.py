@@ -62,7 +62,7 @@ def arm_capsules(
     return placed[:, :, 0], placed[:, :, 1], radii, links
 
 
-def tip_box(description: ArmDescription, tool: Tool, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def tip_box(description: ArmDescription, tool: Tool, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place the tool's tip in the world.
 
     Args:

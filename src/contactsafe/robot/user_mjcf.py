@@ -85,22 +85,12 @@ def from_mjcf(
     home = _home(key_home if home is None else home, q_min, q_max)
     nominal, found = _nominal_model(model, data, chain, site_id, limits), Found(model, data, chain, site_id)
     name, rate = model.names.split(b"\0")[0].decode(), _torque_rate(torque_rate_max, limits)
+    description = describe(found, name, _joints(nominal, q_min, q_max, limits, friction), rate, home)
+    surface = geom_surface(model, data, shown_by(model, chain), data.xanchor[chain])
     return Arm(
-        name=name,
-        model=nominal,
-        site=site,
-        q_min=q_min,
-        q_max=q_max,
-        qd_max=np.full(n, np.inf),
-        tau_max=limits,
-        torque_rate_max=rate,
-        friction=friction,
-        home=home,
-        description=describe(found, name, _joints(nominal, q_min, q_max, limits, friction), rate, home),
-        tool=carried_tool(found, tip),
-        surface=geom_surface(model, data, shown_by(model, chain), data.xanchor[chain]),
-        lever_doubted=_LEVER_DOUBTED,
-    )
+        name, nominal, site, q_min, q_max, np.full(n, np.inf), limits, rate, friction, home, description,
+        carried_tool(found, tip), surface, _LEVER_DOUBTED,
+    )  # fmt: skip
 
 
 def _joint_range(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:

@@ -25,6 +25,20 @@ def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(scene_mjcf(arm, config))
 
 
+def build_plants(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.MjModel]:
+    """Compile a model for each configuration, equal ones once, but for obstacles that travel: those move the model."""
+    known: dict[WorldConfig, mujoco.MjModel] = {}
+    models = []
+    for config in configs:
+        own = not shared or any(any(obstacle.travel) for obstacle in config.obstacles)
+        if own or config not in known:
+            models.append(build_plant(arm, config))
+            known.setdefault(config, models[-1])
+        else:
+            models.append(known[config])
+    return models
+
+
 def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     """Write the MJCF of the world around an arm."""
     description, tool = described(arm)

@@ -23,7 +23,7 @@ from contactsafe.sim.backend import Backend, StepArrays, run_backend
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.mujoco_record import fill_plant, point_plant
 from contactsafe.sim.record import world_bounds, world_dtype
-from contactsafe.sim.scene import build_plant
+from contactsafe.sim.scene import build_plants
 from contactsafe.sim.sensing import fill_errors, noise_channels
 from contactsafe.sim.state import of_physics
 from contactsafe.sim.stepping import run_ticks
@@ -72,20 +72,6 @@ def _one_each(world: WorldConfig | Sequence[WorldConfig] | None, n: int) -> list
     return configs
 
 
-def _models(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[mujoco.MjModel]:
-    """Compile a model for each configuration, equal ones once, but for obstacles that travel: those move the model."""
-    known: dict[WorldConfig, mujoco.MjModel] = {}
-    models = []
-    for config in configs:
-        own = not shared or any(any(obstacle.travel) for obstacle in config.obstacles)
-        if own or config not in known:
-            models.append(build_plant(arm, config))
-            known.setdefault(config, models[-1])
-        else:
-            models.append(known[config])
-    return models
-
-
 def _check_tick(controller: ControllerConfig | None) -> None:
     if controller is not None and controller.clock.dt != TICK_S:
         raise InvalidInputError(f"controller dt = {controller.clock.dt} s; simulated worlds tick every {TICK_S} s")
@@ -129,7 +115,7 @@ class Worlds(Independent):
         self.arm, self.n = arm, n
         self.configs = _one_each(world, n)
         _check_tick(controller)
-        self.models = _models(arm, self.configs, shared)
+        self.models = build_plants(arm, self.configs, shared)
         self.records = np.zeros(n, dtype=world_dtype(arm.n))
         self.controllers = np.zeros(n, dtype=controller_dtype(arm.n))
         self.metrics = np.zeros(n, dtype=step_metrics_dtype)
@@ -266,8 +252,7 @@ class Worlds(Independent):
 
     def run_some(self, start: int, stop: int, ticks: np.ndarray, trace: np.ndarray | None = None) -> None:
         """Run the worlds from start to stop, in the calling thread; `ticks` (n,) and `trace` are sound."""
-        noise = self.sample_noise(start, stop)
-        traces = self.no_trace if trace is None else trace
+        noise, traces = self.sample_noise(start, stop), self.no_trace if trace is None else trace
         arrays = StepArrays(self.records, self.controllers, noise, ticks, self.metrics, self.samples, traces)
         if not self.backends:
             run_worlds(start, stop, *arrays)
@@ -308,8 +293,7 @@ class Worlds(Independent):
         """
         if self.arm.tool is None or self.arm.tool.tip is None:
             raise InvalidInputError(
-                f"arm '{self.arm.name}' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
-                "tip=robots.Tip(...))"
+                f"arm '{self.arm.name}' has no tip to work with; give it one: from_mjcf(..., tip=Tip(...))"
             )
         self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
         if self.backends:

@@ -71,7 +71,7 @@ class InsertionConfig(TaskConfig):
     mouth: Vector3 = (0.5, 0.0, 0.05)
     reward: InsertionReward = field(default_factory=InsertionReward)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Refuse holes that are none."""
         super().__post_init__()
         if not 1e-5 <= self.clearance_m <= 0.005:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.tasks.base.record import end_step, observe_arm
 
@@ -32,7 +33,7 @@ parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", 
 
 
 @compiled
-def measure(task, position):
+def measure(task: Record, position: Vector) -> tuple[float, float]:
     """Return how far the tip is from the mouth, sideways and up together, and how deep in it, m."""
     along, sideways = 0.0, 0.0
     for k in range(3):
@@ -43,7 +44,7 @@ def measure(task, position):
 
 
 @compiled
-def observe(controller, task):
+def observe(controller: Record, task: Record) -> None:
     """Fill what the policy observes."""
     observe_arm(controller, task)
     for k in range(3):
@@ -61,7 +62,7 @@ def observe(controller, task):
 
 
 @compiled
-def score(task, metrics, parameters, position):
+def score(task: Record, metrics: Record, parameters: Record, position: Vector) -> None:
     """Fill the reward's terms of one step, and its ends; potentials, so that nothing is earned in circles."""
     away, depth = measure(task, position)
     task.success = 1 if depth >= parameters.depth_m else 0
@@ -77,7 +78,9 @@ def score(task, metrics, parameters, position):
 
 
 @compiled(nogil=True)
-def finish(start, stop, worlds, controllers, metrics, parameters, tasks):
+def finish(
+    start: int, stop: int, worlds: Record, controllers: Record, metrics: Record, parameters: Record, tasks: Record
+) -> None:
     """Score and observe tasks start to stop; the arrays are those of `Worlds` and `InsertionTasks`."""
     for i in range(start, stop):
         score(tasks[i], metrics[i], parameters, worlds[i].truth.position)
@@ -86,7 +89,7 @@ def finish(start, stop, worlds, controllers, metrics, parameters, tasks):
 
 
 @compiled(nogil=True)
-def begin(worlds, controllers, tasks, i):
+def begin(worlds: Record, controllers: Record, tasks: Record, i: int) -> None:
     """Measure and observe task i at the start of an episode."""
     tasks[i].away, tasks[i].depth = measure(tasks[i], worlds[i].truth.position)
     observe(controllers[i], tasks[i])
