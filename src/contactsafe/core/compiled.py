@@ -9,11 +9,13 @@ import fcntl
 import os
 import sys
 import uuid
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
 from numba.core import caching, event
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from contactsafe.core.cache_folder import CACHE_FOLDER, LOCK, private_to_write, refuse_foreign, say_uncached
 
@@ -158,3 +160,6 @@ class _Announcer(event.Listener):
 
 
 event.register("numba:compile", _Announcer())
+
+# Where a record has all fields of another and more behind them, what was compiled for that one takes it, as it should.
+warnings.filterwarnings("ignore", r"(.|\n)*Record\(", NumbaExperimentalFeatureWarning)

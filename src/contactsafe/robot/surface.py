@@ -35,7 +35,7 @@ def capsule_surface(description: ArmDescription) -> np.ndarray:
         if index > 1
         for capsule in link.capsules
     ]
-    return np.concatenate(rows)
+    return np.concatenate([np.zeros((0, SURFACE_COLUMNS)), *rows])
 
 
 def _capsule_points(link: int, capsule: Capsule) -> np.ndarray:

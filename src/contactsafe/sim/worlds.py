@@ -293,7 +293,8 @@ class Worlds(Independent):
         """
         if self.arm.tool is None or self.arm.tool.tip is None:
             raise InvalidInputError(
-                f"arm '{self.arm.name}' has no tip to work with; give it one: from_mjcf(..., tip=Tip(...))"
+                f"arm '{self.arm.name}' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
+                "tip=robots.Tip(...))"
             )
         self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
         if self.backends:
