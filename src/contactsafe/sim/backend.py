@@ -41,14 +41,14 @@ class StepArrays(NamedTuple):
     """What a step of n worlds reads and writes, in the order of `run_worlds`.
 
     Attributes:
-        worlds, controllers: `world_dtype` and `controller_dtype` records, (n,).
+        records, controllers: `world_dtype` and `controller_dtype` records, (n,).
         noise: standard normal numbers, (n, at least ticks, `noise_channels`).
         ticks: how many each world runs, (n,).
         metrics: `step_metrics_dtype` records, (n,).
         samples, traces: `sample_dtype` and `trace_dtype` records, (n, at least ticks); traces may be (n, 0).
     """
 
-    worlds: np.ndarray
+    records: np.ndarray
     controllers: np.ndarray
     noise: np.ndarray
     ticks: np.ndarray
@@ -59,15 +59,15 @@ class StepArrays(NamedTuple):
 
 def run_backend(backend: Backend, i: int, arrays: StepArrays) -> None:
     """Run ticks[i] ticks of world i in a backend."""
-    worlds, controllers, noise, ticks, metrics, samples, traces = arrays
-    world = worlds[i]
+    records, controllers, noise, ticks, metrics, samples, traces = arrays
+    world = records[i]
     _begin_step(metrics, i, ticks)
     for k in range(ticks[i]):
-        _begin_tick(worlds, controllers, noise, i, k)
+        _begin_tick(records, controllers, noise, i, k)
         backend.write(world)
         backend.step()
         backend.read(world)
-        _end_tick(worlds, controllers, metrics, samples, traces, i, k)
+        _end_tick(records, controllers, metrics, samples, traces, i, k)
     _end_step(metrics, i)
 
 
