@@ -32,7 +32,7 @@ def test_names_and_what_a_check_lets_pass():
     ("words", "text"),
     [
         (["--one", "green"], "'green' is unknown; choose from red, blue"),
-        (["--controllers", "gentle"], "controller 'gentle' is unknown; choose from vices, paper, safe"),
+        (["--controllers", "gentle"], "'gentle' is unknown; choose from vices, paper, safe"),
         (["--controllers", "safe:tank=2"], "parameter 'tank' is unknown; did you mean 'tank_s'?"),
         (["--controllers", "safe:dwell_s=-1"], "dwell_s = -1.0 has a negative number or NaN; give numbers ≥ 0"),
     ],
