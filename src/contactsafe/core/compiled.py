@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 import uuid
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -26,6 +27,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core import caching, event
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 _KEPT_VERSIONS = 4
 _IN_USE_S = 86400.0  # a version started within the last day may still be at work
@@ -352,3 +354,6 @@ class _Announcer(event.Listener):
 
 
 event.register("numba:compile", _Announcer())
+
+# Where a record has all fields of another and more behind them, what was compiled for that one takes it, as it should.
+warnings.filterwarnings("ignore", r"(.|\n)*Record\(", NumbaExperimentalFeatureWarning)
