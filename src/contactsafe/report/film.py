@@ -21,6 +21,9 @@ FRAMES_HZ = 60
 Q_UNIT, POSITION_UNIT, FORCE_UNIT = 2e-4, 1e-4, 0.05
 """rad, m and N of one step of the film's integers."""
 
+CHANNELS = ("x", "y", "z", "force", "mode", "link")
+"""Of a frame, after its joint positions: place of the obstacle, then the rest; film.js finds them by these names."""
+
 _UNCHANGED = 0
 """A cell of a picture that is as in the one before; others hold their value + 1."""
 
@@ -40,6 +43,7 @@ def film_json(experiment: Experiment, stage: Stage) -> str | None:
         return None
     film = {
         "hz": FRAMES_HZ,
+        "channels": CHANNELS,
         "units": {"q": Q_UNIT, "position": POSITION_UNIT, "force": FORCE_UNIT},
         "arm": _arm(stage),
         "surface": {"corners": _rounded(stage.corners), "colours": stage.colours},
