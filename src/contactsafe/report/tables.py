@@ -89,7 +89,7 @@ def _row(experiment: Experiment, label: str, line: Line, names: Sequence[str], o
 
 
 def _mark(line: Line, name: str) -> str:
-    """Return a tick or a cross where there is an aim to compare with, and room for it where not: ratios stay aligned."""
+    """Return a tick or a cross where there is an aim, and room for it where there is none: ratios stay aligned."""
     reached = line.reaches(name)
     if reached is None:
         return '<span class="mark"></span>'
