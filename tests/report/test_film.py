@@ -64,6 +64,7 @@ def test_the_last_joint_was_taken_for_the_obstacle_when_a_channel_went():
     code = (Path(film.__file__).parent / "film.js").read_text(encoding="utf-8")
     read = set(re.findall(r"\b(?:at|place)\.(\w+)", code))
     assert read == set(film.CHANNELS)
+    assert not re.search(r"\.mode\s*[=!<>]", code)
     assert not re.search(r"joints\s*[+]\s*\d|width\s*-\s*\d+;", code)
 
 

@@ -127,9 +127,9 @@
       this.drawSpark(time, style);
       this.bar.style.width = `${Math.min(100, (100 * now.force) / this.scene.limit)}%`;
       this.value.textContent = `${now.force.toFixed(now.force < 9.95 ? 1 : 0)} N`;
-      const names = now.mode === 2 ? "rejects" : "complies with";
-      this.state.textContent = now.mode ? `${names} contact, link ${now.link || "–"}` : "free-space law";
-      this.state.classList.toggle("on", now.mode !== 0);
+      const does = this.film.modes[now.mode];
+      this.state.textContent = does ? `${does} contact, link ${now.link || "–"}` : "free-space law";
+      this.state.classList.toggle("on", Boolean(does));
     }
 
     drawScene(time, now, view, style) {
@@ -201,7 +201,7 @@
 
       const things = capsules.map(({ a, b, r, frame }) => {
         const [p, q] = [project(a), project(b)];
-        const felt = now.mode !== 0 && frame === now.link;
+        const felt = this.film.modes[now.mode] && frame === now.link;
         return [(p[2] + q[2]) / 2, () => {
           line(p, q, 2 * r + 1.6, felt ? style.controller[this.run.controller] : style.edge);
           line(p, q, 2 * r - (felt ? 2 : 0), style.arm);

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactsafe.control.codes import COMPLY, REJECT
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.report import data
 from contactsafe.report.scene import fit
@@ -23,6 +24,9 @@ Q_UNIT, POSITION_UNIT, FORCE_UNIT = 2e-4, 1e-4, 0.05
 
 CHANNELS = ("x", "y", "z", "force", "mode", "link")
 """Of a frame, after its joint positions: place of the obstacle, then the rest; film.js finds them by these names."""
+
+MODES = {COMPLY: "complies with", REJECT: "rejects"}
+"""What an arm does with a contact, by the number in channel `mode`; any other mode has none."""
 
 _UNCHANGED = 0
 """A cell of a picture that is as in the one before; others hold their value + 1."""
@@ -44,6 +48,7 @@ def film_json(experiment: Experiment, stage: Stage) -> str | None:
     film = {
         "hz": FRAMES_HZ,
         "channels": CHANNELS,
+        "modes": MODES,
         "units": {"q": Q_UNIT, "position": POSITION_UNIT, "force": FORCE_UNIT},
         "arm": _arm(stage),
         "surface": {"corners": _rounded(stage.corners), "colours": stage.colours},
