@@ -96,10 +96,10 @@ def figures(train, test, numbers, test_numbers):
     where = fit(reader(inputs.shape[1], 2), inputs, torch.from_numpy(train.nearest).float(), near)
     what = fit(reader(inputs.shape[1], CELLS**2), inputs, torch.from_numpy(train.cells).float(), marked)
     with torch.no_grad():
-        return judge(test, UNIT_M * where(held_out).numpy(), what(held_out).numpy() > 0)
+        return score(test, UNIT_M * where(held_out).numpy(), what(held_out).numpy() > 0)
 
 
-def judge(test, vectors, guess):
+def score(test, vectors, guess):
     """Give (median error, mm; recall; precision) for each amount of ink."""
     error = 1e3 * np.linalg.norm(vectors - test.nearest, axis=1)
     rows = []
@@ -150,7 +150,7 @@ def cnn_figures(train, test, homography):
     where = fit(Cnn(2), views, torch.from_numpy(train.nearest).float(), near)
     what = fit(Cnn(CELLS**2), views, torch.from_numpy(train.cells).float(), marked)
     with torch.no_grad():
-        return judge(test, UNIT_M * where(held_out).numpy(), what(held_out).numpy() > 0)
+        return score(test, UNIT_M * where(held_out).numpy(), what(held_out).numpy() > 0)
 
 
 def line(name, count, active, minutes, rows):

@@ -1,7 +1,9 @@
 """The film's coding of runs: no peak is lost, and pictures come back cell by cell."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,6 +57,15 @@ def test_no_peak_of_a_tick_is_lost(fakes, tick, peak):
     values = film._run(run, of_obstacle=True)
     channels = np.frombuffer(film.base64.b64decode(values["channels"]), "<i2").reshape(values["frames"], -1)
     assert channels[:, 10].max() * FORCE_UNIT == pytest.approx(peak, abs=FORCE_UNIT)
+
+
+def test_the_last_joint_was_taken_for_the_obstacle_when_a_channel_went():
+    """film.js finds what it draws by the names that the film declares, and knows no number of channels."""
+    code = (Path(film.__file__).parent / "film.js").read_text(encoding="utf-8")
+    read = set(re.findall(r"\b(?:at|place)\.(\w+)", code))
+    assert read == set(film.CHANNELS)
+    assert not re.search(r"\.mode\s*[=!<>]", code)
+    assert not re.search(r"joints\s*[+]\s*\d|width\s*-\s*\d+;", code)
 
 
 def experiment(*runs):

@@ -178,6 +178,9 @@ def test_film_holds_the_recordings(page, experiments):
             assert values[:, 10].max() * FORCE_UNIT == pytest.approx(
                 recording.trace["obstacle_force"].max(), abs=FORCE_UNIT
             )
+            named = dict(zip(film["channels"], values[:, 7:].T, strict=True))
+            for name in ("mode", "link"):
+                np.testing.assert_array_equal(named[name], recording.trace[name][ticks(360)])
             np.testing.assert_array_equal(pictures_of(run), recording.pictures)
 
 

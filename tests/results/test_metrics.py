@@ -46,7 +46,7 @@ def test_bounds_are_in_the_shown_unit(value, bound, scale):
 
 
 @given(st.lists(figures, min_size=2, max_size=20), figures)
-def test_always_is_judged_on_the_largest(values, bound):
+def test_always_is_compared_with_the_largest(values, bound):
     assert Aim(at_most=bound, always=True).is_reached(of(*values), None, 1.0) == (max(values) <= bound)
 
 
@@ -68,11 +68,11 @@ def test_ratios_do_not_depend_on_the_unit(value, baseline):
         (Aim(at_most=1.0, where_baseline_above=8.0), of(1.0), None),
     ],
 )
-def test_what_cannot_be_said_is_not_judged(aim, value, baseline):
+def test_what_cannot_be_said_is_not_compared(aim, value, baseline):
     assert aim.is_reached(value, baseline, 1.0) is None
 
 
-def test_the_mean_is_judged_where_the_metric_says_so():
+def test_the_mean_is_compared_where_the_metric_says_so():
     value = of(0.0, 1.0, 1.0)
     aim = Aim(at_least=0.9)
     assert aim.is_reached(value, None, 1.0)

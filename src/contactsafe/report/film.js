@@ -43,7 +43,9 @@
       this.film = film;
       this.values = decode(run.channels, Int16Array);
       this.width = this.values.length / run.frames;
-      this.joints = this.width - 7;
+      this.joints = this.width - film.channels.length;
+      // Where each channel is in a frame, by its name; joint positions come first.
+      this.place = Object.fromEntries(film.channels.map((name, k) => [name, this.joints + k]));
       this.canvas = document.createElement("canvas");
       [this.canvas.height, this.canvas.width] = run.cells;
       this.codes = new Uint16Array(run.cells[0] * run.cells[1]);
@@ -55,15 +57,15 @@
     }
     at(time) {
       const f = Math.max(0, Math.min(this.frames - 1, Math.round(time * this.film.hz)));
-      const v = this.values.subarray(f * this.width, (f + 1) * this.width), n = this.joints, u = this.film.units;
+      const v = this.values.subarray(f * this.width, (f + 1) * this.width), n = this.joints, at = this.place, u = this.film.units;
       return {
         q: Array.from(v.subarray(0, n), (x) => x * u.q),
-        obstacle: Array.from(v.subarray(n, n + 3), (x) => x * u.position),
-        force: v[n + 3] * u.force, mode: v[n + 4], link: v[n + 5],
+        obstacle: [v[at.x], v[at.y], v[at.z]].map((x) => x * u.position),
+        force: v[at.force] * u.force, mode: v[at.mode], link: v[at.link],
       };
     }
     force(frame) {
-      return this.values[frame * this.width + this.joints + 3] * this.film.units.force;
+      return this.values[frame * this.width + this.place.force] * this.film.units.force;
     }
     // Pictures follow each other: a code of 0 leaves a cell as it was, another is its value + 1.
     change(index) {
@@ -125,9 +127,9 @@
       this.drawSpark(time, style);
       this.bar.style.width = `${Math.min(100, (100 * now.force) / this.scene.limit)}%`;
       this.value.textContent = `${now.force.toFixed(now.force < 9.95 ? 1 : 0)} N`;
-      const names = now.mode === 2 ? "rejects" : "complies with";
-      this.state.textContent = now.mode ? `${names} contact, link ${now.link || "–"}` : "free-space law";
-      this.state.classList.toggle("on", now.mode !== 0);
+      const does = this.film.modes[now.mode];
+      this.state.textContent = does ? `${does} contact, link ${now.link || "–"}` : "free-space law";
+      this.state.classList.toggle("on", Boolean(does));
     }
 
     drawScene(time, now, view, style) {
@@ -199,7 +201,7 @@
 
       const things = capsules.map(({ a, b, r, frame }) => {
         const [p, q] = [project(a), project(b)];
-        const felt = now.mode !== 0 && frame === now.link;
+        const felt = this.film.modes[now.mode] && frame === now.link;
         return [(p[2] + q[2]) / 2, () => {
           line(p, q, 2 * r + 1.6, felt ? style.controller[this.run.controller] : style.edge);
           line(p, q, 2 * r - (felt ? 2 : 0), style.arm);

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactsafe.control.codes import COMPLY, REJECT
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.report import data
 from contactsafe.report.scene import fit
@@ -20,6 +21,12 @@ FRAMES_HZ = 60
 
 Q_UNIT, POSITION_UNIT, FORCE_UNIT = 2e-4, 1e-4, 0.05
 """rad, m and N of one step of the film's integers."""
+
+CHANNELS = ("x", "y", "z", "force", "mode", "link")
+"""Of a frame, after its joint positions: place of the obstacle, then the rest; film.js finds them by these names."""
+
+MODES = {COMPLY: "complies with", REJECT: "rejects"}
+"""What an arm does with a contact, by the number in channel `mode`; any other mode has none."""
 
 _UNCHANGED = 0
 """A cell of a picture that is as in the one before; others hold their value + 1."""
@@ -40,6 +47,8 @@ def film_json(experiment: Experiment, stage: Stage) -> str | None:
         return None
     film = {
         "hz": FRAMES_HZ,
+        "channels": CHANNELS,
+        "modes": MODES,
         "units": {"q": Q_UNIT, "position": POSITION_UNIT, "force": FORCE_UNIT},
         "arm": _arm(stage),
         "surface": {"corners": _rounded(stage.corners), "colours": stage.colours},

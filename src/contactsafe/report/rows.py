@@ -1,4 +1,4 @@
-"""The declared metrics filled in: one line a scenario and metric, its aims judged."""
+"""The declared metrics filled in: one line a scenario and metric, compared with its aims."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ class Line:
         return self.values.get(BASELINE)
 
     def reaches(self, controller: str) -> bool | None:
-        """Return whether a controller reaches the aim; None where there is none, or nothing to judge."""
+        """Return whether a controller reaches the aim; None where there is none, or nothing to compare."""
         aim = self.metric.aim
         return None if aim is None else aim.is_reached(self.values.get(controller), self.baseline, self.metric.scale)
 
@@ -78,7 +78,7 @@ def shortfalls(experiment: Experiment, controller: str) -> list[str]:
         if aim is None or line.reaches(controller) is not False:
             continue
         value, unit, scale = line.values[controller], line.metric.unit, line.metric.scale
-        sentence = f"{line.scenario}: {line.metric.label} is {number(scale * aim.judged(value))} {unit}"
+        sentence = f"{line.scenario}: {line.metric.label} is {number(scale * aim.compared(value))} {unit}"
         multiple = ratio(value, line.baseline)
         if line.baseline is not None and not aim.always and math.isfinite(multiple):
             sentence += f", {number(multiple)} of the {number(scale * line.baseline.middle)} {unit} of {BASELINE}"

@@ -17,7 +17,7 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
     """Return the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
 
     The last columns give the ratio of the last controller's median to the baseline's, and the aim with "ok" or "MISSED"
-    where it can be judged. The experiments' own tables follow.
+    where there is a figure. The experiments' own tables follow.
 
     Args:
         experiments: what was measured.

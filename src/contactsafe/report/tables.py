@@ -64,7 +64,7 @@ def table(experiments: Sequence[Experiment], names: Sequence[str], main_only: bo
     return (
         '<div class="wide"><table><thead><tr><th>median [p5, p95] over seeds</th><th></th>'
         f'{head}<th class="aim">aim</th></tr></thead><tbody>{"".join(body)}</tbody></table></div>'
-        '<p class="note">✓ reaches the aim, ✗ misses it: judged on the median or mean shown, '
+        '<p class="note">✓ reaches the aim, ✗ misses it: compared with the median or mean shown, '
         "“always” on the largest of all runs.</p>"
     )
 
@@ -89,7 +89,7 @@ def _row(experiment: Experiment, label: str, line: Line, names: Sequence[str], o
 
 
 def _mark(line: Line, name: str) -> str:
-    """Return a tick or a cross where the aim can be judged, and room for it where not: ratios stay aligned."""
+    """Return a tick or a cross where there is an aim, and room for it where there is none: ratios stay aligned."""
     reached = line.reaches(name)
     if reached is None:
         return '<span class="mark"></span>'
@@ -124,7 +124,7 @@ def tally(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
         reached, total = (sum(counts) for counts in zip(*(_count(e, name) for e in experiments), strict=True))
         if name != BASELINE and total:
             said.append(f'<strong class="name" {coloured(name)}>{escape(name)}</strong> reaches {reached} of {total}')
-    return f"<p>Of the aims that these runs can judge, {', '.join(said)}.</p>" if said else ""
+    return f"<p>Of the aims that these runs have figures for, {', '.join(said)}.</p>" if said else ""
 
 
 def verdict(experiment: Experiment, names: Sequence[str]) -> str:
@@ -146,9 +146,9 @@ def verdict(experiment: Experiment, names: Sequence[str]) -> str:
 
 
 def _count(experiment: Experiment, name: str) -> tuple[int, int]:
-    """Return the number of aims reached, and of aims that could be judged."""
-    judged = [line.reaches(name) for line in rows.lines(experiment)]
-    return sum(reached is True for reached in judged), sum(reached is not None for reached in judged)
+    """Return the number of aims reached, and of aims with figures to compare."""
+    compared = [line.reaches(name) for line in rows.lines(experiment)]
+    return sum(reached is True for reached in compared), sum(reached is not None for reached in compared)
 
 
 def _spread(value: Spread | None, scale: float) -> str:

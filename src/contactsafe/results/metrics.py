@@ -15,15 +15,15 @@ BASELINE = "vices"
 
 @dataclass(frozen=True)
 class Aim:
-    """What a metric should be; judged on its middle over seeds, or on its largest value where `always`.
+    """What a metric should be, compared with its middle over seeds, or with its largest value where `always`.
 
     Attributes:
         at_most: largest value allowed, in the metric's shown unit.
         at_least: smallest value allowed, in the shown unit.
         ratio_at_most: largest multiple of the baseline's middle allowed.
         ratio_at_least: smallest multiple of the baseline's middle allowed.
-        where_baseline_above: judge only where the baseline's middle passes this, in the shown unit.
-        always: judge the largest value over seeds.
+        where_baseline_above: compare only where the baseline's middle passes this, in the shown unit.
+        always: compare the largest value over seeds.
     """
 
     at_most: float | None = None
@@ -63,7 +63,7 @@ class Aim:
         """
         if value is None or value.n == 0:
             return None
-        found, multiple = scale * self.judged(value), ratio(value, baseline)
+        found, multiple = scale * self.compared(value), ratio(value, baseline)
         reference = math.nan if baseline is None else scale * baseline.middle
         if self.where_baseline_above is not None and not reference > self.where_baseline_above:
             return None
@@ -76,8 +76,8 @@ class Aim:
             and (self.ratio_at_least is None or multiple >= self.ratio_at_least)
         )
 
-    def judged(self, value: Spread) -> float:
-        """Return the value of a spread that the aim is judged on."""
+    def compared(self, value: Spread) -> float:
+        """Return the value of a spread that the aim is compared with."""
         return value.max if self.always else value.middle
 
 

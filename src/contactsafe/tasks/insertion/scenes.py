@@ -15,6 +15,7 @@ from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.panda import PANDA
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG, PEG_RADIUS
@@ -127,7 +128,7 @@ def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
 
 def straight_in(config: InsertionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
     """Return a script that goes straight down into the hole, to its full depth."""
-    down = (_ABOVE_M + config.depth_m) / (60.0 * _DOWN_S) / config.action.translation[2]
+    down = (_ABOVE_M + config.depth_m) / (POLICY_RATE_HZ * _DOWN_S) / config.action.translation[2]
 
     def act(observation: dict[str, np.ndarray]) -> np.ndarray:
         actions = _nothing(observation)

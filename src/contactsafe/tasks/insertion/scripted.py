@@ -7,6 +7,7 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.insertion.config import InsertionConfig
 
@@ -39,7 +40,7 @@ class StraightDown(Independent):
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18)."""
         actions = np.zeros((len(observation["offset"]), ACTION_SIZE), np.float32)
-        actions[:, 2] = -_DESCENT_M_S / 60.0 / self._step[2]
+        actions[:, 2] = -_DESCENT_M_S / POLICY_RATE_HZ / self._step[2]
         return actions
 
 
@@ -79,13 +80,13 @@ class SpiralSearch(Independent):
         radius = _PITCH_M * self._angle[i] / (2.0 * np.pi)
         point = radius * np.array([np.cos(self._angle[i]), np.sin(self._angle[i])])
         if self._landed[i] and np.linalg.norm(point - tool) < _BEHIND_M:
-            self._angle[i] += _SPEED_M_S / 60.0 / max(radius, _PITCH_M)
+            self._angle[i] += _SPEED_M_S / POLICY_RATE_HZ / max(radius, _PITCH_M)
         return point
 
     def _down(self, i: int, inside: bool, force: float) -> float:
         """Return the step of x_d downwards, m: at a steady speed in the air and in the hole, after the force on top."""
         if inside or not self._landed[i]:
-            return -_DESCENT_M_S / 60.0
+            return -_DESCENT_M_S / POLICY_RATE_HZ
         return 2e-4 * float(np.clip((force - PRESS_N) / PRESS_N, -1.0, 1.0))
 
 

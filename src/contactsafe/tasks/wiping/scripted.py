@@ -9,6 +9,7 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.vision.log_polar import RINGS, SECTORS, ground_of, log_polar_features
@@ -53,7 +54,7 @@ class _Script(Independent):
         for i in range(len(pose)):
             goal, lower = self._goal(i, observation)
             step = goal - (pose[i, :2] + target[i, :2])
-            most = SPEED_M_S / 60.0
+            most = SPEED_M_S / POLICY_RATE_HZ
             actions[i, :2] = step * most / max(float(np.linalg.norm(step)), most) / self._step[:2]
             if lower:
                 actions[i, 2] = self._press(i, force[i]) / self._step[2]
@@ -63,7 +64,7 @@ class _Script(Independent):
         """Return the step of x_d downwards, m: at a steady speed to the board, then after the force."""
         self._landed[i] |= force > TOUCH_N
         if not self._landed[i]:
-            return -DESCENT_M_S / 60.0
+            return -DESCENT_M_S / POLICY_RATE_HZ
         return 2e-4 * np.clip((force - PRESS_N) / PRESS_N, -1.0, 1.0)
 
     def _goal(self, i, observation):
