@@ -1,73 +1,89 @@
-"""Draw the learning curves of runs of `contactsafe train` into one picture, and say when each cleared its boards.
+"""Draw the learning curves of runs of `contactsafe train` into one picture, and say when each had learned its task.
 
     python tools/learning_curves.py runs/seed0 runs/seed1 runs/seed2 --out docs/learning.png
 
-Share of boards and ink are means over the last hundred episodes of training: with exploration, on worlds that differ.
-Before every world has had the time of a whole episode only those that were cleared can have ended: that is left out.
+Runs whose folders differ in a number at the end alone, as here, are seeds of one setting and have one colour. Success
+and force are means over the last hundred episodes of training: with exploration, on worlds that differ. Before every
+environment has had the time of a whole episode only those that succeeded can have ended: that is left out.
 """
 
 import argparse
 import json
+import re
 from pathlib import Path
 
 from matplotlib.figure import Figure
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-EPISODE_STEPS = 1200
-SHARE = 0.9
+SUCCESS = 0.9
+"""Of the last hundred episodes: the task counts as learned."""
+
+Curve = dict[str, list[float]]
 
 
-def curve(run: Path) -> dict[str, list[float]]:
-    """Read a run's log: minutes, steps, fraction of boards cleared, fraction of ink left."""
-    first = EPISODE_STEPS * json.loads((run / "config.json").read_text(encoding="utf-8"))["num_envs"]
+def curve(run: Path) -> Curve:
+    """Read a run's log: steps, minutes, fraction of episodes that succeeded, largest force of an episode, N."""
     log = EventAccumulator(str(run))
     log.Reload()
-    minutes = {event.step: event.value for event in log.Scalars("time/minutes")}
-    cleared = {event.step: event.value for event in log.Scalars("episode/success")}
-    left = {event.step: 1.0 - event.value for event in log.Scalars("episode/ink_removed")}
-    steps = sorted(step for step in cleared if step > first)
+    minutes, success, force, length = (
+        {event.step: event.value for event in log.Scalars(name)}
+        for name in ("time/minutes", "episode/success", "episode/force_peak_n", "episode/steps")
+    )
+    config = json.loads((run / "config.json").read_text(encoding="utf-8"))
+    first = config["num_envs"] * max(length.values()) / config["action_repeat"]
+    steps = sorted(step for step in success if step > first)
     return {
         "steps": steps,
         "minutes": [minutes[step] for step in steps],
-        "cleared": [cleared[step] for step in steps],
-        "left": [left[step] for step in steps],
+        "success": [success[step] for step in steps],
+        "force": [force[step] for step in steps],
     }
 
 
-def row(run: Path, c: dict[str, list[float]]) -> str:
+def row(run: Path, c: Curve) -> str:
     """Write a run as a line of Markdown's table."""
-    reached = next((k for k, share in enumerate(c["cleared"]) if share >= SHARE), None)
+    reached = next((k for k, success in enumerate(c["success"]) if success >= SUCCESS), None)
     at = "never" if reached is None else f"{c['minutes'][reached]:.1f} min, {c['steps'][reached]:,} steps"
     manifest = run / "bundle" / "bundle.json"
     results = json.loads(manifest.read_text(encoding="utf-8"))["results"] if manifest.exists() else {}
-    boards = f"{results['cleared_99']:.0%} of {results['episodes']}" if results else "-"
-    return f"| {run.name} | {at} | {c['minutes'][-1]:.1f} min, {c['steps'][-1]:,} steps | {boards} |"
+    held_out = f"{results['success']:.1%} of {results['episodes']}" if results else "-"
+    return f"| {run.name} | {at} | {c['minutes'][-1]:.1f} min, {c['steps'][-1]:,} steps | {held_out} |"
 
 
-def draw(curves: dict[str, dict[str, list[float]]], out: Path) -> None:
-    """Draw the share of boards cleared over minutes and over steps, and the ink left over steps."""
+def setting(run: Path) -> str:
+    """Return what a run shares its colour and its name in the picture by: its folder's name, but for the number."""
+    return re.sub(r"[-_]?\d+$", "", run.name)
+
+
+def draw(curves: dict[Path, Curve], out: Path) -> None:
+    """Draw success over minutes and over steps, and the largest force over steps."""
     figure = Figure(figsize=(10.5, 3.4), layout="constrained")
-    by_minutes, by_steps, ink = figure.subplots(1, 3)
-    for name, c in curves.items():
-        millions = [steps / 1e6 for steps in c["steps"]]
-        cleared = [100 * share for share in c["cleared"]]
-        by_minutes.plot(c["minutes"], cleared, label=name)
-        by_steps.plot(millions, cleared)
-        ink.plot(millions, [100 * share for share in c["left"]])
-    for axes, unit in ((by_minutes, "minutes trained"), (by_steps, "million steps")):
-        axes.axhline(100 * SHARE, color="0.6", linewidth=0.8, linestyle="--")
-        axes.set(title="boards cleared, %", xlabel=unit, ylim=(0, 102), xlim=(0, None))
-    ink.set(title="ink left, % (logarithmic)", xlabel="million steps", yscale="log", xlim=(0, None))
-    by_minutes.legend(loc="lower right", frameon=False)
-    for axes in (by_minutes, by_steps, ink):
+    by_minutes, by_steps, force = figure.subplots(1, 3)
+    settings = list(dict.fromkeys(map(setting, curves)))
+    for run, c in curves.items():
+        look = {"color": f"C{settings.index(setting(run))}", "linewidth": 1.2}
+        thousands = [steps / 1e3 for steps in c["steps"]]
+        success = [100 * fraction for fraction in c["success"]]
+        by_minutes.plot(c["minutes"], success, **look)
+        by_steps.plot(thousands, success, **look)
+        force.plot(thousands, c["force"], **look)
+    for axes, unit in ((by_minutes, "minutes trained"), (by_steps, "thousand steps")):
+        axes.axhline(100 * SUCCESS, color="0.6", linewidth=0.8, linestyle="--")
+        axes.set(title="episodes that succeed, %", xlabel=unit, ylim=(0, 102))
+    force.set(title="largest force of an episode, N", xlabel="thousand steps", ylim=(0, None))
+    for axes in (by_minutes, by_steps, force):
         axes.grid(alpha=0.3)
+        axes.set_xlim(0, None)
         axes.spines[["top", "right"]].set_visible(False)
+    if len(settings) > 1:
+        lines = [by_minutes.plot([], [], color=f"C{k}")[0] for k in range(len(settings))]
+        figure.legend(lines, settings, loc="outside lower center", ncols=len(settings), frameon=False)
     figure.savefig(out, dpi=100)
 
 
 def main() -> None:
     """Draw and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("runs", nargs="+", type=Path, help="folders of runs, as --out of contactsafe train named them")
     parser.add_argument("--out", type=Path, default=Path("learning.png"), help="picture to write")
     arguments = parser.parse_args()
@@ -77,10 +93,10 @@ def main() -> None:
     missing = [run for run in arguments.runs if not (run / "config.json").exists()]
     if missing:
         parser.error(f"{missing[0]} holds no run (config.json); give folders that `contactsafe train` wrote")
-    curves = {run.name: curve(run) for run in arguments.runs}
-    print(f"| run | {SHARE:.0%} of the last hundred training boards | whole run | held-out boards, 99 % of ink gone |")
+    curves = {run: curve(run) for run in arguments.runs}
+    print(f"| run | {SUCCESS:.0%} of the last hundred training episodes | whole run | held-out episodes |")
     print("|---|---|---|---|")
-    for run, c in zip(arguments.runs, curves.values(), strict=True):
+    for run, c in curves.items():
         print(row(run, c))
     draw(curves, arguments.out)
 

@@ -51,11 +51,9 @@ FIGURES = (
         "length of an episode, s: mean; 20 s where nothing ended it before, such as a clean board",
         mean("time_s"),
     ),
-    Figure("time_to_clean_median_s", "the same, of the boards wiped clean alone: median", median_time_to_success),
+    Figure("time_to_success_median_s", "the same, of the boards wiped clean alone: median", median_time_to_success),
     *FORCES,
-    Figure(
-        "arm_table_contacts", "episodes ended because something other than the pad met board or table", _arm_contacts
-    ),
+    Figure("arm_contacts", "episodes ended because something other than the pad met board or table", _arm_contacts),
     Figure(
         "contact_fraction",
         "fraction of all policy steps in which the tool was in contact; the rest goes from patch to patch",
