@@ -63,7 +63,9 @@ def timed(owner, name, spent):
 def make(config):
     """Make the environment as `contactsafe train` does, on log-polar features whose statistics do not matter here."""
     task = task_by_name(config.task)
-    raw = make_vec(task.name, config.num_envs, task.training_config(config.randomise, config.conditions))
+    raw = make_vec(
+        task.name, config.num_envs, task.training_config(config.randomise, config.conditions, config.gentleness)
+    )
     perception = Perception(None, "log_polar", 0.64, 128, raw.unwrapped.camera_homography, config.encoder_threads)
     zeros = np.zeros(perception.latent_size)
     scaling = ObservationScaling.from_statistics(raw.unwrapped.observation_vectors, zeros, zeros + 1.0)

@@ -1,7 +1,7 @@
 """Training takes a task by its name: its settings, its observation, with a camera or none, and its paper's wording."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,10 @@ from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
 from contactsafe.policy.bundle import Bundle, blank_observation  # noqa: E402
 from contactsafe.policy.conditions import Conditions  # noqa: E402
 from contactsafe.policy.policy import Policy  # noqa: E402
-from contactsafe.tasks import make_vec, task_by_name  # noqa: E402
+from contactsafe.tasks import TASKS, make_vec, task_by_name  # noqa: E402
+from contactsafe.tasks.base.config import TaskConfig  # noqa: E402
+from contactsafe.tasks.base.task import Task  # noqa: E402
+from contactsafe.tasks.base.tasks import Tasks  # noqa: E402
 
 TINY = {"num_envs": 2, "total_steps": 32, "rollout_steps": 8, "batch": 16, "net": (8, 8), "evaluate_episodes": 0}
 WORDS = ["--num-envs", "2", "--rollout-steps", "8", "--batch", "16", "--net", "8", "8", "--evaluate-episodes", "2"]
@@ -59,11 +62,42 @@ def test_words_say_otherwise(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "known"), [("gains", "learned, low, middle, high"), ("controller", "vices, paper, safe")]
+    ("name", "told"),
+    [
+        ("gains", "gains = 'none'; choose from learned, low, middle, high"),
+        ("controller", "controller 'none' is unknown; choose from vices, paper, safe"),
+    ],
 )
-def test_a_name_that_is_unknown_is_told(name, known):
-    with pytest.raises(InvalidInputError, match=rf"{name} = 'none'; choose from {known}"):
+def test_a_name_that_is_unknown_is_told(name, told):
+    with pytest.raises(InvalidInputError, match=told):
         Conditions(**{name: "none"})
+
+
+def test_gentleness_multiplies_what_the_reward_takes_for_force_and_nothing_else():
+    for task in map(task_by_name, TASKS):
+        usual, gentler = task.training_config(False), task.training_config(False, gentleness=3.0)
+        assert gentler.reward.force == 3.0 * usual.reward.force
+        assert replace(gentler, reward=usual.reward) == usual
+
+
+def test_a_reward_that_takes_nothing_for_force_cannot_be_made_gentler():
+    @dataclass(frozen=True)
+    class Plain(TaskConfig):
+        pass
+
+    task = Task(type("Still", (Tasks,), {"name": "still", "config_type": Plain}))
+    assert task.training_config(True, gentleness=1.0) == Plain()
+    with pytest.raises(InvalidInputError, match=r"gentleness = 0.0, but the reward of task 'still' has no weight"):
+        task.training_config(True, gentleness=0.0)
+
+
+def test_a_policy_is_trained_over_a_preset_with_other_values_of_its_parameters(monkeypatch):
+    told = []
+    monkeypatch.setattr("contactsafe.learning.train_policy.train_policy", lambda config, *_: told.append(config))
+    assert main(["train", "ppo", "--task", "insertion", "--controller", "safe:tool_force_limit_n=12"]) == 0
+    assert told[0].conditions.controller == "safe:tool_force_limit_n=12"
+    assert main(["train", "ppo", "--task", "insertion", "--controller", "safe:tool_force=12"]) == 2
+    assert len(told) == 1
 
 
 # -- a task without a camera ------------------------------------------------------------------------------------------

@@ -18,7 +18,8 @@ def test_every_preset_goes_with_all_gains(controller, gains):
 @pytest.mark.parametrize(
     ("fields", "told"),
     [
-        ({"controller": "gentle"}, "controller = 'gentle'; choose from vices, paper, safe"),
+        ({"controller": "gentle"}, "controller 'gentle' is unknown; choose from vices, paper, safe"),
+        ({"controller": "safe:gentle=1"}, "parameter 'gentle' is unknown; choose from dt"),
         ({"controller": None}, "controller = None; choose from"),
         ({"gains": "most"}, "gains = 'most'; choose from learned, low, middle, high"),
         ({"gains": ["low"]}, "gains = "),

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from contactsafe.control.config import ControllerConfig, value_from_text
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, shown
 
 __all__ = ["PRESETS", "SAFE", "by_name", "paper", "safe", "vices"]
 
@@ -84,7 +84,7 @@ def by_name(name: str) -> ControllerConfig:
     """
     preset, *changes = name.split(":")
     if preset not in PRESETS:
-        raise InvalidInputError(f"controller '{preset}' is unknown; choose from {', '.join(PRESETS)}")
+        raise InvalidInputError(f"controller {shown(preset)} is unknown; choose from {', '.join(PRESETS)}")
     changed = {}
     for change in changes:
         parameter, equals, text = change.partition("=")

@@ -48,9 +48,11 @@ class PolicyConfig:
         task: what is learned; from Python, any name for the environments that are handed over.
         as_paper: configure task and training as the paper words them: free-space controller, pose and latent alone, its
             reward; takes an encoder of `contactsafe train vae --representation paper`.
-        controller: preset underneath.
+        controller: preset underneath, as it is or with other values of parameters: `safe:tool_force_limit_n=12`.
         gains: who sets K1 and D1: the policy (learned), or nobody: K1 stays at the low end, in the middle or at the
             high end of its range, D1 critical, and the policy has six actions in place of eighteen.
+        gentleness: what the reward takes for force is multiplied by this; 0 for a reward that does not ask for
+            gentle contacts.
         randomise: train on worlds that differ from episode to episode; held-out episodes are of the nominal one.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
@@ -80,8 +82,9 @@ class PolicyConfig:
     resume: bool = False
     task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
     as_paper: bool = Conditions.as_paper
-    controller: Annotated[str, one_of(presets.PRESETS)] = Conditions.controller
+    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name)] = Conditions.controller
     gains: Annotated[str, one_of(GAINS)] = Conditions.gains
+    gentleness: float = 1.0
     randomise: bool = True
     num_envs: int = 64
     total_steps: int = 1_500_000
@@ -114,7 +117,7 @@ class PolicyConfig:
         ):
             if getattr(self, name) < 1:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 1 or more")
-        for name in ("max_minutes", "evaluate_episodes", "seed"):
+        for name in ("max_minutes", "evaluate_episodes", "seed", "gentleness"):
             if not getattr(self, name) >= 0:
                 raise InvalidInputError(f"{name} = {getattr(self, name)}; give 0 or more")
         if len(set(self.observes)) < len(self.observes):

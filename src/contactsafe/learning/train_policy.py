@@ -68,7 +68,9 @@ def train_policy(
 def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
     """Return how to make a task's environments: those for training, and the held-out ones."""
     task = task_by_name(config.task)
-    training, nominal = (task.training_config(randomise, config.conditions) for randomise in (config.randomise, False))
+    training, nominal = (
+        task.training_config(randomise, config.conditions, config.gentleness) for randomise in (config.randomise, False)
+    )
     return lambda n: make_vec(task.name, n, training), lambda n: make_vec(task.name, n, nominal)
 
 

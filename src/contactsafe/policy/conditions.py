@@ -12,7 +12,8 @@ class Conditions:
     """What belongs to a policy beside its networks: a bundle holds it, and evaluation and experiments keep to it.
 
     Attributes:
-        controller: preset that it was trained over; evaluation takes it where no other is named.
+        controller: preset that it was trained over, as `presets.by_name` takes it; evaluation takes it where no other
+            is named.
         gains: who sets K1 and D1, see `ActionConfig`.
         as_paper: whether the task is configured as the paper words it.
     """
@@ -23,8 +24,10 @@ class Conditions:
 
     def __post_init__(self) -> None:
         """Refuse names that are unknown."""
-        for name, value, known in (("controller", self.controller, presets.PRESETS), ("gains", self.gains, GAINS)):
-            if not isinstance(value, str) or value not in known:
-                raise InvalidInputError(f"{name} = {shown(value)}; choose from {', '.join(known)}")
+        if not isinstance(self.controller, str):
+            raise InvalidInputError(f"controller = {shown(self.controller)}; choose from {', '.join(presets.PRESETS)}")
+        presets.by_name(self.controller)
+        if not isinstance(self.gains, str) or self.gains not in GAINS:
+            raise InvalidInputError(f"gains = {shown(self.gains)}; choose from {', '.join(GAINS)}")
         if not isinstance(self.as_paper, bool):
             raise InvalidInputError(f"as_paper = {shown(self.as_paper)}; give true or false")

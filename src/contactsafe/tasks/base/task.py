@@ -97,9 +97,29 @@ class Task:
         """Return the task's configuration under options, and under the conditions of a policy."""
         return self._under(conditions, {} if options is None else options.settings())
 
-    def training_config(self, randomise: bool, conditions: Conditions | None = None) -> TaskConfig:
-        """Return the configuration that policies are trained under."""
-        return self._under(conditions, self.training if randomise else {})
+    def training_config(
+        self, randomise: bool, conditions: Conditions | None = None, gentleness: float = 1.0
+    ) -> TaskConfig:
+        """Return the configuration that policies are trained under.
+
+        Args:
+            randomise: worlds differ from episode to episode.
+            conditions: of the policy.
+            gentleness: factor on the weight `force` of the task's reward.
+
+        Raises:
+            InvalidInputError: the factor is not 1, and the task's reward has no such weight.
+        """
+        config = self._under(conditions, self.training if randomise else {})
+        if gentleness == 1.0:
+            return config
+        reward: Any = getattr(config, "reward", None)
+        if not hasattr(reward, "force"):
+            raise InvalidInputError(
+                f"gentleness = {gentleness}, but the reward of task '{self.name}' has no weight `force`; leave it at 1"
+            )
+        gentler: Any = {"reward": replace(reward, force=gentleness * reward.force)}
+        return replace(config, **gentler)
 
     def settings_of(self, algorithm: str, as_paper: bool = False) -> dict[str, Any]:
         """Return the settings of training that differ from an algorithm's own."""
