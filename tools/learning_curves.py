@@ -40,19 +40,24 @@ def curve(run: Path) -> Curve:
     }
 
 
-def row(run: Path, c: Curve) -> str:
-    """Write a run as a line of Markdown's table."""
-    reached = next((k for k, success in enumerate(c["success"]) if success >= SUCCESS), None)
-    at = "never" if reached is None else f"{c['minutes'][reached]:.1f} min, {c['steps'][reached]:,} steps"
-    manifest = run / "bundle" / "bundle.json"
-    results = json.loads(manifest.read_text(encoding="utf-8"))["results"] if manifest.exists() else {}
-    held_out = f"{results['success']:.1%} of {results['episodes']}" if results else "-"
-    return f"| {run.name} | {at} | {c['minutes'][-1]:.1f} min, {c['steps'][-1]:,} steps | {held_out} |"
-
-
 def setting(run: Path) -> str:
     """Return what a run shares its colour and its name in the picture by: its folder's name, but for the number."""
     return re.sub(r"[-_]?\d+$", "", run.name)
+
+
+def row(name: str, curves: dict[Path, Curve]) -> str:
+    """Write a line of Markdown's table for the seeds of a setting."""
+    each = [_learned(run, c) for run, c in curves.items()]
+    return f"| {name} | {' | '.join(', '.join(column) for column in zip(*each, strict=True))} |"
+
+
+def _learned(run: Path, c: Curve) -> tuple[str, str, str]:
+    """Say when a run had learned its task, how long it took, and what its policy does on held-out episodes."""
+    reached = next((k for k, success in enumerate(c["success"]) if success >= SUCCESS), None)
+    at = "never" if reached is None else f"{c['steps'][reached] / 1e3:.0f}k ({c['minutes'][reached]:.1f} min)"
+    manifest = run / "bundle" / "bundle.json"
+    results = json.loads(manifest.read_text(encoding="utf-8"))["results"] if manifest.exists() else {}
+    return at, f"{c['minutes'][-1]:.1f} min", f"{100 * results['success']:.1f}" if results else "-"
 
 
 def draw(curves: dict[Path, Curve], out: Path) -> None:
@@ -94,10 +99,9 @@ def main() -> None:
     if missing:
         parser.error(f"{missing[0]} holds no run (config.json); give folders that `contactsafe train` wrote")
     curves = {run: curve(run) for run in arguments.runs}
-    print(f"| run | {SUCCESS:.0%} of the last hundred training episodes | whole run | held-out episodes |")
-    print("|---|---|---|---|")
-    for run, c in curves.items():
-        print(row(run, c))
+    print(f"| runs | {SUCCESS:.0%} in training after, steps | whole run | held-out episodes, % |\n|---|---|---|---|")
+    for name in dict.fromkeys(map(setting, curves)):
+        print(row(name, {run: c for run, c in curves.items() if setting(run) == name}))
     draw(curves, arguments.out)
 
 
