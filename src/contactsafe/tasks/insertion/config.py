@@ -8,18 +8,18 @@ from contactsafe.sim.fixtures import Vector3
 from contactsafe.tasks.base.config import TaskConfig
 
 ACTION = ActionConfig(
-    translation=(0.0005, 0.0005, 0.0004),
+    translation=(0.0005, 0.0005, 0.0003),
     rotation=(0.0025, 0.0025, 0.0025),
     offset_max=0.008,
-    offset_max_z=0.008,
-    damping_low=(24.0, 24.0, 24.0, 40.0, 40.0, 40.0),
-    damping_high=(45.0, 45.0, 45.0, 60.0, 60.0, 60.0),
+    offset_max_z=0.006,
+    damping_low=(32.0, 32.0, 32.0, 40.0, 40.0, 40.0),
+    damping_high=(50.0, 50.0, 50.0, 60.0, 60.0, 60.0),
     press=0.06,
     height=0.03,
     reach=0.02,
     tilt=0.08,
 )
-"""At most 30 mm/s sideways, 24 mm/s down, and 0.15 rad/s about each axis."""
+"""At most 30 mm/s sideways, 18 mm/s down, and 0.15 rad/s about each axis."""
 
 
 @dataclass(frozen=True)

@@ -32,13 +32,14 @@ class InsertionOptions(TaskOptions):
 PPO = {
     "num_envs": 32,
     "rollout_steps": 64,
-    "total_steps": 800_000,
+    "total_steps": 600_000,
     "batch": 512,
     "discount": 0.99,
     "action_repeat": 2,
     "net": (128, 128),
     "log_std_init": -0.7,
-    "log_std_final": -1.2,
+    "log_std_final": -1.0,
+    "target_kl": 0.1,
 }
 """What PPO learns it with: 30 decisions a second, and more noise than by default."""
 
