@@ -115,7 +115,8 @@ def test_an_aim_of_several_scenarios_is_said_once():
     table = terminal_table([Experiment("pushes", "Pushes", "?", tuple(trials), (metric,))])
     _, _, heading, rest, moving = table.splitlines()
     assert heading == "Pushes: tool error; aim: under 10 mm"
-    assert rest.endswith("  ok") and moving.endswith("  MISSED")
+    assert rest.endswith("  ok")
+    assert moving.endswith("  MISSED")
 
 
 def test_terminal_table_of_nothing():
