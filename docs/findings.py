@@ -373,7 +373,7 @@ def soft_wrist() -> None:
         away = -1000 * out.error[:3]
         softest = 150.0 * np.linalg.eigvalsh(m.Lambda[3:, 3:])[0]
         say(f"{name:20s} K1 150: {softest:.1f} N m/rad about the softest axis, Λ_zx {m.Lambda[2, 0]:.1f} kg; "
-            f"25 N in z moves the tool {away[0]:.0f} mm in x, {away[2]:.0f} mm in z")  # fmt: skip
+            f"25 N in z: tool {away[0]:.0f} mm in x, {away[2]:.0f} mm in z")  # fmt: skip
 
 
 def _arm_mjcf(mass: float = 1.0, armature: float = 1.0) -> str:

@@ -172,7 +172,7 @@ def main():
             ("log-polar", lambda: (features, None)),
             ("β-VAE, tool's frame, 128", lambda: vae_numbers(sampler, folder, "tool", 2)),
             ("β-VAE, tool's frame, 64", lambda: vae_numbers(sampler, folder, "tool", 1)),
-            ("β-VAE, camera's frame, 128 (paper), and the pose", lambda: vae_numbers(sampler, folder, "paper", 2)),
+            ("β-VAE of the paper, and the pose", lambda: vae_numbers(sampler, folder, "paper", 2)),
         ):
             start = time.monotonic()
             look, active = make()

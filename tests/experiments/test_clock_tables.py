@@ -7,7 +7,8 @@ import pytest
 
 from contactsafe.experiments.clock_cases import CASES, SITUATIONS, heading
 from contactsafe.experiments.clock_tables import clock_tables
-from contactsafe.results.experiment import Trial
+from contactsafe.report import terminal_table
+from contactsafe.results.experiment import Experiment, Trial
 
 NAN = float("nan")
 BRIDGED = next(case for case in CASES if not case.stops and case.silent_s == 0.0)
@@ -58,3 +59,14 @@ def test_what_no_trial_has_is_no_number():
     ]
     (row, _) = clock_tables(trials, ("safe",), (BRIDGED,))[0].rows
     assert np.isnan(row[8])
+
+
+def test_all_cases_fit_a_page_of_120_columns():
+    trials = [
+        Trial(heading(case, timed, situation), "safe", 0, metrics(case, 0, situation == "in contact"))
+        for case, timed, situation in itertools.product(CASES, (False, True), SITUATIONS)
+    ]
+    tables = tuple(clock_tables(trials, ("safe",), CASES))
+    printed = terminal_table([Experiment("clock", "Clocks", "", (), (), tables=tables)])
+    assert max(map(len, printed.splitlines())) <= 120
+    assert len(printed.splitlines()) > 2 * len(CASES)

@@ -24,9 +24,10 @@ from contactsafe.core.copying import Threads  # noqa: E402
 from contactsafe.core.errors import InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.algorithms import PpoConfig, SacConfig  # noqa: E402
 from contactsafe.learning.checkpoints import load_checkpoint, save_checkpoint  # noqa: E402
+from contactsafe.learning.curves import Curves  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.packing import pack, unpack  # noqa: E402
-from contactsafe.learning.recorder import Curves, Recorder  # noqa: E402
+from contactsafe.learning.recorder import Recorder  # noqa: E402
 from contactsafe.learning.settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402

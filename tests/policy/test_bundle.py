@@ -16,7 +16,8 @@ from tests.learning.fakes import camera_homography, sample_masks  # noqa: E402
 
 from contactsafe.core.errors import BundleError, ContactSafeError, InvalidInputError, OutputError  # noqa: E402
 from contactsafe.learning.encoder import VAE, EncoderConfig, MaskEncoder  # noqa: E402
-from contactsafe.learning.export import DeployedPolicy, compare, export_bundle, export_encoder, to_onnx  # noqa: E402
+from contactsafe.learning.export import export_bundle, export_encoder  # noqa: E402
+from contactsafe.learning.onnx_models import DeployedPolicy, compare, to_onnx  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.conditions import Conditions  # noqa: E402
 from contactsafe.policy.graph import read_graph  # noqa: E402

@@ -12,6 +12,7 @@ from contactsafe.report import prepare_output, terminal_table, write_report, wri
 from contactsafe.report.output import write_whole
 from contactsafe.report.summary import trials_csv
 from contactsafe.results.experiment import Experiment, Table, Trial
+from contactsafe.results.metrics import Aim, Metric
 
 
 def strict(text):
@@ -106,6 +107,16 @@ def test_terminal_table_aligns(experiments):
     figures = [line for line in lines[1:] if line.startswith("  ")]
     assert len(figures) == 3 + 6 + 6
     assert all(line[end - 4 : end].strip().replace(".", "").isdigit() for line in figures)
+
+
+def test_an_aim_of_several_scenarios_is_said_once():
+    metric = Metric("error_mm", "tool error", "mm", main=True, aim=Aim(at_most=10.0))
+    trials = [Trial(where, "safe", 0, {"error_mm": value}) for where, value in (("at rest", 5.0), ("moving", 12.0))]
+    table = terminal_table([Experiment("pushes", "Pushes", "?", tuple(trials), (metric,))])
+    _, _, heading, rest, moving = table.splitlines()
+    assert heading == "Pushes: tool error; aim: under 10 mm"
+    assert rest.endswith("  ok")
+    assert moving.endswith("  MISSED")
 
 
 def test_terminal_table_of_nothing():

@@ -41,7 +41,7 @@ def passive_step(
 ) -> None:
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
-    Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016, eq. 12), each axis by
+    Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016), each axis by
     itself. Falling gains are free.
 
     Args:
@@ -72,7 +72,7 @@ def follow_gains(impedance: Record, target: Record, dt: float, params: Record) -
 def task_wrenches(
     impedance: Record, Lambda: Matrix, error: Vector, dynamics: Record, delay_s: float, params: Record
 ) -> tuple[Vector, Vector]:
-    """Return elastic and damping wrench at the tool, (4), (6,) each, N and N m; and note the largest damping.
+    """Return elastic and damping wrench at the tool, (5), (6,) each, N and N m; and note the largest damping.
 
     Args:
         impedance: `impedance_dtype` record; its `task_damping` is set.

@@ -64,7 +64,7 @@ def _determinant(A: Matrix) -> float:
 
 @compiled
 def stiffness_wrench(Lambda: Matrix, error: Vector, K_task: Vector, linear_max: float, angular_max: float) -> Vector:
-    """Return the task stiffness force, Λ K e of (4), (6,), N and N m; K e no longer than a bound.
+    """Return the task stiffness force, Λ K e of (5), (6,), N and N m; K e no longer than a bound.
 
     Args:
         Lambda: task inertia, (6, 6).
@@ -83,7 +83,7 @@ def stiffness_wrench(Lambda: Matrix, error: Vector, K_task: Vector, linear_max: 
 
 @compiled
 def damping_wrench(Lambda: Matrix, velocity: Vector, Jdot_qd: Vector, D_task: Vector) -> Vector:
-    """Return the damping force of the task, −Λ (D ẋ + J̇ q̇) of (4), (6,), N and N m.
+    """Return the damping force of the task, −Λ (D ẋ + J̇ q̇) of (5), (6,), N and N m.
 
     Args:
         Lambda: task inertia, (6, 6).

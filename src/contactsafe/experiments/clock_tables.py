@@ -16,26 +16,32 @@ def clock_tables(trials: Sequence[Trial], controllers: Sequence[str], cases: Seq
         for trial in trials:
             if trial.controller == name:
                 of_controller.setdefault(trial.scenario, []).append(trial.metrics)
-        for stops, columns, metric, title in (
-            (False, _AWAY, "tool_away_mm", "bridged"), (True, _TRAVEL, "tool_travel_mm", "braked"),
-        ):  # fmt: skip
+        for stops, columns, metric, title, note in (
+            (False, _AWAY, "tool_away_mm", "bridged", _AWAY_NOTE),
+            (True, _TRAVEL, "tool_travel_mm", "braked", _TRAVEL_NOTE),
+        ):
             rows = tuple(
                 _row(of_controller, case, timed, metric, stops)
                 for case in cases if (case.stops or case.silent_s > 0.0) == stops
                 for timed in (False, True)
             )  # fmt: skip
-            tables.append(Table(f"{title}_{name}", f"{name}: what is {title}, the worst of all seeds", columns, rows))
+            heading = f"{name}: what is {title}, the worst of all seeds"
+            tables.append(Table(f"{title}_{name}", heading, columns, rows, note))
     return tables
 
 
-_AWAY = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool away, mm: moving", "at rest", "sliding",
-    "in contact", "contact force, N", "undisturbed, N",
-)  # fmt: skip
-_TRAVEL = (
-    "what happens", "time", "false contact, ms", "torque step, N m", "tool travels, mm: moving", "at rest", "sliding",
-    "in contact", "joint speed left, rad/s", "fault", "step when reset, N m",
-)  # fmt: skip
+_FIRST = ("what happens", "time", "false ms", "step N m", *SITUATIONS)
+_AWAY = (*_FIRST, "force N", "calm N")
+_TRAVEL = (*_FIRST, "speed", "fault", "reset")
+_FIRST_NOTE = "False: how long a contact is reported that is none. Step: largest change of a torque in a tick."
+_AWAY_NOTE = (
+    f"{_FIRST_NOTE} From {SITUATIONS[0]} to {SITUATIONS[-1]}: largest distance of the tool from the same run "
+    "undisturbed, mm. Force: peak force of the obstacle on the arm; calm: the same undisturbed."
+)
+_TRAVEL_NOTE = (
+    f"{_FIRST_NOTE} From {SITUATIONS[0]} to {SITUATIONS[-1]}: path of the tool until it rests, mm. Speed: of the "
+    "fastest joint in the end, rad/s. Reset: largest torque step, N m, when the arm is then taken over."
+)
 
 
 def _row(

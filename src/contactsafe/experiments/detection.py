@@ -1,4 +1,4 @@
-"""Detection: how soon is a contact reported, is its link named rightly, and how often is one reported that is none?"""
+"""Detection: how soon is a contact reported, is its link isolated correctly, and how often is it false?"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,14 +19,14 @@ from contactsafe.robot import robots
 NAME = "detection"
 QUESTION = (
     "A random point of links 3 to 7 is pushed while the arm moves, its plant and sensors with errors: how soon is a "
-    "step of 3 N m reported, is the link of 10 to 60 N named rightly, and is a contact ever reported where there is "
-    "none?"
+    "step of 3 N m reported, is the link of 10 to 60 N isolated correctly, and is a contact ever reported where there "
+    "is none?"
 )
 METRICS = (
     Metric("within_15_ms", "reported within 15 ms, mean", "%", 100.0, main=True, aim=Aim(at_least=95.0), mean=True),
     Metric("within_30_ms", "reported within 30 ms, mean", "%", 100.0, main=True, aim=Aim(at_least=99.0), mean=True),
     Metric("detect_ms", "onset to report", "ms", main=True),
-    Metric("link_right", "link named rightly, mean", "%", 100.0, main=True, aim=Aim(at_least=95.0), mean=True),
+    Metric("link_right", "link isolated correctly, mean", "%", 100.0, main=True, aim=Aim(at_least=95.0), mean=True),
     Metric("own_torque_nm", "true torque on the link's own joint", "N m"),
     Metric("force_n", "force of the push", "N"),
     Metric("reported_early", "a contact reported before the push, mean", "%", 100.0, main=True, mean=True),
@@ -135,7 +135,7 @@ def _confusion(name: str, trials: Sequence[Trial]) -> Table:
     columns = ("link", "contacts", "none named", *(f"{link} named" for link in range(1, 8)), "right (%)", "own (N m)")
     early = sum(t.scenario == CONTACT and t.metrics["reported_early"] > 0 for t in trials)
     note = (
-        f"Links as named {NAMED_AFTER_MS} ms after the onset of 10 to 60 N. Own: median of the true torque on the "
+        f"Links isolated {NAMED_AFTER_MS} ms after the onset of 10 to 60 N. Own: median of the true torque on the "
         f"joint that moves the link; a push near its axis shows none. Left out, reported before: {early}."
     )
-    return Table(f"links_{name}", f"Links named by {name}", columns, tuple(rows), note)
+    return Table(f"links_{name}", f"Links isolated by {name}", columns, tuple(rows), note)

@@ -13,9 +13,10 @@ from tqdm import tqdm
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.learning.checkpoints import run_folder, write_json
+from contactsafe.learning.curves import Curves
 from contactsafe.learning.export import export_bundle
 from contactsafe.learning.policy_config import PolicyConfig
-from contactsafe.learning.recorder import Curves, Recorder
+from contactsafe.learning.recorder import Recorder
 from contactsafe.learning.run import Run, load_run
 from contactsafe.learning.settings import plain
 from contactsafe.learning.vec_env import EncodedVecEnv

@@ -13,11 +13,11 @@ from tqdm import tqdm
 from contactsafe.core.parse import one_of
 from contactsafe.learning.checking import check_like, check_optimiser, entry, whole
 from contactsafe.learning.checkpoints import load_checkpoint, refused_as, run_folder, save_checkpoint, write_json
+from contactsafe.learning.curves import EventFile
 from contactsafe.learning.datasets import MaskDataset, SampleMasks, make_dataset
 from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
 from contactsafe.learning.probe import batches, nearest_foreground_error, reconstruction_report
-from contactsafe.learning.recorder import EventFile
 from contactsafe.learning.settings import check_same_config, plain
 from contactsafe.policy.bundle import ENCODER, ENCODER_DESCRIPTION
 from contactsafe.policy.perception import ENCODER_FORMAT, Perception

@@ -17,7 +17,8 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
     """Return the main figures for a terminal: median and [5th, 95th percentile] over seeds, in ASCII.
 
     The last columns give the ratio of the last controller's median to the baseline's, and the aim with "ok" or "MISSED"
-    where there is a figure. The experiments' own tables follow.
+    where there is a figure; where one metric heads several scenarios, the heading says its aim once for all of them.
+    The experiments' own tables follow.
 
     Args:
         experiments: what was measured.
@@ -30,8 +31,9 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
     table: list[list[str]] = [["median [p5, p95] over seeds", "", *names, f"{subject}/{BASELINE}", "aim"]]
     for experiment in experiments:
         for heading, labelled in rows.groups(experiment, main_only=True):
-            table.append([f"{experiment.title}: {heading}"])
-            table += [_row(label, line, names) for label, line in labelled]
+            shared = _shared_aim([line for _, line in labelled])
+            table.append([f"{experiment.title}: {heading}" + (f"; aim: {_ascii(shared)}" if shared else "")])
+            table += [_row(label, line, names, aim=not shared) for label, line in labelled]
     return "\n\n".join([_align(table), *(_plain(own) for experiment in experiments for own in experiment.tables)])
 
 
@@ -49,15 +51,23 @@ def _plain(table: Table) -> str:
     return "\n".join([_ascii(table.title), line(table.columns), *map(line, cells), *note])
 
 
-def _row(label: str, line: rows.Line, names: Sequence[str]) -> list[str]:
+def _shared_aim(lines: Sequence[rows.Line]) -> str:
+    """Return the aim of lines that are one metric in several scenarios, else nothing."""
+    metric = lines[0].metric
+    one = len(lines) > 1 and all(line.metric is metric for line in lines)
+    return metric.aim.text(metric.unit) if one and metric.aim else ""
+
+
+def _row(label: str, line: rows.Line, names: Sequence[str], aim: bool) -> list[str]:
     metric, subject = line.metric, names[-1]
-    reached = {True: " ok", False: " MISSED", None: ""}[line.reaches(subject)]
+    said = [metric.aim.text(metric.unit)] if aim and metric.aim else []
+    said += {True: ["ok"], False: ["MISSED"], None: []}[line.reaches(subject)]
     return [
         f"  {label}",
         metric.unit,
         *(_cell(line.values.get(name), metric.scale) for name in names),
         _ascii(data.number(ratio(line.values.get(subject), line.baseline))),
-        _ascii(metric.aim.text(metric.unit)) + reached if metric.aim else "",
+        _ascii(" ".join(said)),
     ]
 
 

@@ -18,7 +18,7 @@ def joint_friction(parameters: Matrix, qd: Vector) -> Vector:
 def joint_friction_into(parameters: Matrix, qd: Vector, out: Vector) -> Vector:
     """Fill the torque that friction takes from each joint, and give it back.
 
-    φ1/(1 + exp(−φ2 (q̇ + φ3))) − φ1/(1 + exp(−φ2 φ3)); Gaz et al. 2019, eq. (10).
+    φ1/(1 + exp(−φ2 (q̇ + φ3))) − φ1/(1 + exp(−φ2 φ3)); Gaz et al. 2019.
 
     Args:
         parameters: φ1 N m, φ2 s/rad, φ3 rad/s, (n, 3).
