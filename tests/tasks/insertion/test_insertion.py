@@ -116,6 +116,7 @@ def test_scripts_are_gentle_and_a_search_finds_more_than_going_straight_down():
         ({"clearance_m": 0.0}, "clearance_m = 0.0; give 0.00001 to 0.005 m, between the radii"),
         ({"depth_m": 0.04}, "depth_m = 0.04; give more than 0 and at most 0.03 m"),
         ({"error_m": -1.0}, "error_m = -1.0, tilt_rad = 0.035; give at most 0.02 m and 0.2 rad, none negative"),
+        ({"start_m": (0.02, 0.01)}, "start_m = (0.02, 0.01); give (low, high) with 0 ≤ low ≤ high ≤ 0.2 m"),
         ({"friction": (0.5, 0.1)}, "friction = (0.5, 0.1); give (low, high) with 0 ≤ low ≤ high ≤ 2"),
         ({"episode_s": 0}, "episode_s = 0; give seconds, from 1/60 to 86400, a day"),
     ],

@@ -29,7 +29,7 @@ BIAS_STEPS = 6
 
 _SMOOTHING = 0.5  # of the wrench, a policy step
 
-parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m", "radius_m")])
+parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m")])
 
 
 @compiled

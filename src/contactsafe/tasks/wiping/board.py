@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, replace
 
-from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface, Vector3, workbench
+from contactsafe.tasks.base.tip import tip_of
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,4 @@ def pad_half(arm: Arm) -> Vector3:
     Raises:
         InvalidInputError: its tool has no box for a tip.
     """
-    if arm.tool is None or arm.tool.tip is None or arm.tool.tip.shape != "box":
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no pad to wipe with; give it a box for a tip: the tool robots.WIPER, or "
-            "robots.from_mjcf(..., tip=robots.Tip((0.02, 0.02, 0.01)))"
-        )
-    return arm.tool.tip.half_size
+    return tip_of(arm, "box", "wiping", "robots.WIPER").half_size
