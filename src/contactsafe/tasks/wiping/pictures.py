@@ -3,7 +3,7 @@
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage, level_rectangle
-from contactsafe.robot.panda import PANDA, WIPER
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
@@ -27,5 +27,8 @@ HIGHLIGHTS = (Highlight(NAME, "ink_removed", "Ink wiped off boards never seen be
 
 PANELS = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
-_BOARD = BoardConfig()
-STAGE = Stage(PANDA, WIPER, level_rectangle(_BOARD.centre, _BOARD.size), {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
+
+def stage(arm: Arm, board: BoardConfig) -> Stage:
+    """Return the arm over its board."""
+    colours = {INK: (24, 48, 104), OBJECT: (20, 20, 22)}
+    return Stage(*description_and_tool(arm), level_rectangle(board.centre, board.size), colours)

@@ -11,6 +11,7 @@ from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ACTION_SIZE, ActionConfig
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
@@ -62,6 +63,7 @@ class Wiping:
 
     Args:
         config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+        arm: that works; None for a Panda with a wiper.
     """
 
     name = pictures.NAME
@@ -69,26 +71,31 @@ class Wiping:
     metrics: tuple[Metric, ...] = pictures.METRICS
     highlights: tuple[Highlight, ...] = pictures.HIGHLIGHTS
     panels: tuple[Panel, ...] = pictures.PANELS
-    stage = pictures.STAGE
 
-    def __init__(self, config: WipingConfig | None = None):
-        self._config = config or WipingConfig()
+    def __init__(self, config: WipingConfig | None = None, arm: Arm | None = None):
+        self._config, self.arm = config or WipingConfig(), arm or robots.panda()
+        self.stage = pictures.stage(self.arm, self._config.board)
+
+    def _tasks(
+        self, config: WipingConfig, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
+    ) -> WipingTasks:
+        return WipingTasks(config, len(seeds), list(seeds), worlds, self.arm)
 
     def _under(self, controller: str) -> WipingConfig:
         return replace(self._config, controller=controller)
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
         """Return held-out boards."""
-        return WipingEpisodes(WipingTasks(self._under(controller), len(seeds), list(seeds)), seeds)
+        return WipingEpisodes(self._tasks(self._under(controller), seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> WipingEpisodes:
         """Return boards with a lure on the right, begun on the left, and an obstacle between."""
-        probe, rngs = WipingTasks(WipingConfig()), [held_out(seed) for seed in seeds]
+        probe, rngs = WipingTasks(WipingConfig(), arm=self.arm), [held_out(seed) for seed in seeds]
         obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
         worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
-        tasks = WipingTasks(self._under(controller), len(seeds), list(seeds), worlds)
+        tasks = self._tasks(self._under(controller), seeds, worlds)
         return WipingEpisodes(tasks, seeds, _lured, rngs)
 
     def scripted(
@@ -101,7 +108,7 @@ class Wiping:
     ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return boards and a script: strokes, or nothing just above the board."""
         action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
-        tasks = WipingTasks(WipingConfig(controller=controller, action=action), len(seeds), list(seeds), worlds)
+        tasks = self._tasks(WipingConfig(controller=controller, action=action), seeds, worlds)
         x, y, z = tasks.config.board.centre
         start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
         episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))
