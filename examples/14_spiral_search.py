@@ -16,7 +16,7 @@ def main(folder: str = ".", seed: int = 2) -> dict[str, float]:
     """Insert one peg, draw it, and return the depth at the end, m, and the largest force of a step's mean, N."""
     envs = gymnasium.make_vec("contactsafe/Insertion-v0", num_envs=1, autoreset_mode="disabled")
     tasks = envs.unwrapped.tasks
-    spiral = task_by_name("insertion").scripted["spiral"](tasks.config, envs.unwrapped, seed)
+    spiral = task_by_name("insertion").scripted_policy("spiral", tasks.config, envs, seed)
     observation, _ = envs.reset(seed=seed)
     spiral.begin(0)
     path, depth, force = [], [], []

@@ -13,13 +13,12 @@ from numpy.testing import assert_array_equal
 import contactsafe as cs
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import Tip
-from contactsafe.tasks import make_vec
+from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.base.pushes import Pushes
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.tasks import InsertionTasks
 from contactsafe.tasks.wiping.config import BoardConfig, WipingConfig
 from contactsafe.tasks.wiping.randomisation import Randomisation
-from contactsafe.tasks.wiping.scripted import scripted_policy
 
 ROBOT = """
 <mujoco model="palletiser">
@@ -81,7 +80,7 @@ def test_it_wipes_a_raster_for_eight_seconds_without_fault():
     config = WipingConfig(episode_s=8.0)
     envs = make_vec("wiping", 2, config, arm=robot())
     seen, _ = envs.reset(seed=1)
-    raster = scripted_policy("raster", config, envs, 0)
+    raster = task_by_name("wiping").scripted_policy("raster", config, envs, 0)
     for i in range(2):
         raster.begin(i)
     for _ in range(479):

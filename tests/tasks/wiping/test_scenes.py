@@ -94,7 +94,7 @@ def test_a_script_holds_above_the_board_or_strokes_on_it(works):
 def test_strokes_add_up_to_their_half_length_within_actions():
     action = ActionConfig()
     act = strokes(action)
-    steps = np.array([act({"pose": np.zeros((1, 6))})[0] for _ in range(75)])  # a quarter of a period
+    steps = np.array([act({"target": np.zeros((1, 18))})[0] for _ in range(75)])  # a quarter of a period
     assert np.abs(steps).max() <= 1.0
     assert steps[:, 1].sum() * action.translation[1] == pytest.approx(0.08)
     assert steps[:, 2].sum() * action.translation[2] == pytest.approx(-0.005)

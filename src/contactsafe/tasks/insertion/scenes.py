@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from contactsafe.policy.action import DOWN
-from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage, level_rectangle
@@ -17,6 +16,7 @@ from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes
+from contactsafe.tasks.base.scripted import hold_still
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG
 from contactsafe.tasks.insertion.tasks import InsertionTasks
@@ -114,7 +114,7 @@ class Insertion:
         config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
         tasks = self._tasks(config, seeds, worlds)
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
-        return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else _nothing
+        return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else hold_still
 
     def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
         """Return whether the peg is in, how deep, and how long that took."""
@@ -125,16 +125,12 @@ class Insertion:
         }
 
 
-def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
-    return np.zeros((len(observation["offset"]), ACTION_SIZE))
-
-
 def straight_in(config: InsertionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
     """Return a script that goes straight down into the hole, to its full depth."""
     down = (_ABOVE_M + config.depth_m) / (POLICY_RATE_HZ * _DOWN_S) / config.action.translation[2]
 
     def act(observation: dict[str, np.ndarray]) -> np.ndarray:
-        actions = _nothing(observation)
+        actions = hold_still(observation)
         actions[:, 2] = np.where(observation["offset"][:, 2] > -config.depth_m, -down, 0.0)
         return actions
 
