@@ -14,7 +14,6 @@ from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_tria
 from contactsafe.experiments.pushes import CONTACT, NAMED_AFTER_MS, STEP, push_trials, pushed_links
 from contactsafe.results.experiment import Experiment, Table, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric
-from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 
 NAME = "detection"
@@ -42,13 +41,13 @@ def detection(config: ExperimentConfig, progress: Progress | None = None) -> Exp
     """Run the experiment; it needs no policy. Controllers that are blind to contact are left out.
 
     Args:
-        config: controllers, seeds and minutes.
+        config: controllers, arm, seeds and minutes.
         progress: told of every trial done.
 
     Raises:
         InvalidInputError: no controller reports contacts.
     """
-    arm, seeds = robots.panda(), config.seeds
+    arm, seeds = config.arm, config.seeds
     trials: list[Trial] = []
     for name, controller in reporting(config.controllers).items():
         for first in range(0, len(seeds), _BATCH):

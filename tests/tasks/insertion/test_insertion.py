@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.tasks.insertion.config import InsertionConfig
@@ -125,6 +125,20 @@ def test_holes_that_cannot_be_are_refused(fields, told):
     with pytest.raises(InvalidInputError) as error:
         InsertionConfig(**fields)
     assert str(error.value) == told
+
+
+@pytest.mark.parametrize(
+    ("height", "told"),
+    [
+        ("high", "height is str, not numbers; give one finite number"),
+        (float("nan"), "height = nan; every number must be finite"),
+        (10.0, "task 'insertion' needs the tool at"),
+    ],
+)
+def test_a_height_that_cannot_be_is_refused_in_one_line(height, told):
+    with pytest.raises(ContactSafeError) as error:
+        begun(height=height)
+    assert str(error.value).startswith(told)
 
 
 def test_options_become_the_configuration():

@@ -11,7 +11,7 @@ from contactsafe.core.rotation import quat_to_matrix, rotvec_to_quat
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.observation import Observation, target_observation
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface
 from contactsafe.tasks.base.tasks import Tasks
@@ -93,8 +93,8 @@ class InsertionTasks(Tasks):
         self.worlds.set_tip_friction(i, rng.uniform(*config.friction))
         task["believed"], task["mouth"] = believed, believed + error
         task["axis"] = -quat_to_matrix(tilt)[:, 2]
-        height = rng.uniform(*config.start_m)
-        return Pose(believed + np.array([0.0, 0.0, options.get("height", height)]), DOWN)
+        height = finite_array(options.get("height", rng.uniform(*config.start_m)), (), "height")
+        return Pose(believed + np.array([0.0, 0.0, float(height)]), DOWN)
 
     def begun(self, i: int, rng: np.random.Generator) -> None:
         """Measure and observe for the first time."""
