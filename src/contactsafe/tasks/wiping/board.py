@@ -1,7 +1,9 @@
 """The whiteboard and the camera that looks at it."""
 
+import math
 from dataclasses import dataclass, replace
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface, Vector3, workbench
@@ -28,6 +30,19 @@ class BoardConfig:
     friction: float = 0.3
     press_n: float = 0.5
 
+    def __post_init__(self) -> None:
+        """Refuse a board that cannot be."""
+        if not 0.0 < self.cell <= self.ink_size <= min(self.size) < math.inf:
+            raise InvalidInputError(
+                f"board size = {self.size}, ink_size = {self.ink_size}, cell = {self.cell}; give a cell greater than "
+                "0 m, an ink_size of at least one cell, and edges of at least ink_size"
+            )
+        if not (0.0 <= self.friction <= 10.0 and 0.0 <= self.press_n < math.inf):
+            raise InvalidInputError(
+                f"board friction = {self.friction}, press_n = {self.press_n}; give a friction of 0 to 10, and a force "
+                "of 0 N or more"
+            )
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -47,6 +62,19 @@ class Camera:
     target: Vector3 = (0.5, 0.0, 0.01)
     focal_px: float = 180.0
     size: int = 128
+
+    def __post_init__(self) -> None:
+        """Refuse a camera that sees nothing."""
+        if not (isinstance(self.size, int) and 1 <= self.size <= 4096 and 0.0 < self.focal_px < math.inf):
+            raise InvalidInputError(
+                f"camera size = {self.size!r}, focal_px = {self.focal_px}; give 1 to 4096 whole pixels, and a focal "
+                "length greater than 0"
+            )
+        if not math.dist(self.position[:2], self.target[:2]) > 0.0:
+            raise InvalidInputError(
+                f"camera position = {self.position} is straight above or below its target {self.target}, or no number; "
+                "move it aside: its picture stands upright"
+            )
 
 
 def furnish(world: WorldConfig, board: BoardConfig) -> WorldConfig:
