@@ -12,7 +12,6 @@ from contactsafe.control.checks import (
     refuse_overload,
     seconds,
     shaped,
-    unit_quaternion,
     within_limit,
 )
 from contactsafe.control.config import ControllerConfig
@@ -25,7 +24,7 @@ from contactsafe.control.signals import Measurement, Output, Target, output_of
 from contactsafe.control.tick import tick_at
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm
+from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm, unit_quaternion
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.payload import Payload, carrying, checked_payload
 

@@ -172,6 +172,19 @@ def finite_array(value: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndar
     return array
 
 
+def unit_quaternion(value: ArrayLike, name: str) -> np.ndarray:
+    """Check a quaternion w x y z to 1e-3 of unit length and normalise it, (4,).
+
+    Raises:
+        InvalidInputError: not four finite numbers, or not of unit length.
+    """
+    quat = finite_array(value, (4,), name)
+    norm = float(np.linalg.norm(quat))
+    if abs(norm - 1.0) > 1e-3:
+        raise InvalidInputError(f"{name} has length {norm:.4g}; give a unit quaternion w x y z (divide by its length)")
+    return quat / norm
+
+
 def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
     return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
