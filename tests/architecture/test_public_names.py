@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 INDEX = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
 ROOMS = {
     room: set(re.findall(r"`(\w+)`", names))
-    for room, names in re.findall(r"^\| \{py:mod\}`(contactsafe\.\w+)` \| (.*) \|$", INDEX, re.MULTILINE)
+    for room, names in re.findall(r"^- \{py:mod\}`(contactsafe\.\w+)`: (.*(?:\n  .*)*)", INDEX, re.MULTILINE)
 }
 
 
