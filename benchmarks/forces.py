@@ -11,8 +11,8 @@ import numpy as np
 
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.policy.policy import Policy
+from contactsafe.results.metrics import CONTACT_N
 from contactsafe.tasks import make_vec
-from contactsafe.tasks.base.evaluation import CONTACT_N
 from contactsafe.tasks.wiping.config import WipingConfig
 
 STEPS = 600  # ten seconds

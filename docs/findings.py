@@ -28,11 +28,12 @@ from contactsafe.experiments.adversarial import run_adversarial
 from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.collision_scenes import sample_meetings
 from contactsafe.experiments.collisions import run_battery
-from contactsafe.experiments.disturbance import PUSH_POINTS
 from contactsafe.experiments.false_alarms import false_alarm_trials, sample_strokes
+from contactsafe.experiments.franka_links import PUSH_POINTS
 from contactsafe.experiments.motions import Playback, record
 from contactsafe.experiments.pushes import CONTACT, point_torque, sample_push
-from contactsafe.experiments.surfaces import clearance, description_and_tool
+from contactsafe.experiments.surfaces import clearance
+from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.shape import link_frames
 from contactsafe.sim.config import NO_NOISE, PlantConfig, WorldConfig

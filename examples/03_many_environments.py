@@ -10,8 +10,7 @@ import numpy as np
 from drawing import COLOUR, panels, save
 
 import contactsafe  # noqa: F401  (makes the environment known)
-from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.policy.policy import Policy
+from contactsafe.policy import Policy, shipped_bundle
 
 
 def main(folder: str = ".", steps: int = 120) -> np.ndarray:

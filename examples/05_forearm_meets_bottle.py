@@ -9,13 +9,13 @@ from matplotlib.patches import Circle
 from simulation import ARM, simulate, smooth
 
 import contactsafe as cs
-from contactsafe.experiments.joint_safety import forearm
-from contactsafe.report.scene import View
-from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.obstacles import bottle
+from contactsafe.report import View
+from contactsafe.robot import arm_capsules
+from contactsafe.sim import WorldConfig, bottle
 
 VIEW = View(target=(0.13, -0.06, 0.45), span=(0.62, 0.72), azimuth=0.0, elevation=np.pi / 2)  # from above
 TRAVEL_M, TRAVEL_S = 0.25, 1.5
+FOREARM = 5  # link
 
 
 def sweep(seconds: float) -> np.ndarray:
@@ -25,8 +25,10 @@ def sweep(seconds: float) -> np.ndarray:
 
 def main(folder: str = ".") -> dict[str, float]:
     """Draw, and return the force on the bottle over the last two seconds for each controller, N."""
-    middle, radius = forearm(ARM, ARM.home)
-    thing = bottle((float(middle[0]), float(middle[1] - radius - 0.035 - 0.04), float(middle[2])))
+    starts, ends, radii, links = arm_capsules(ARM.description, ARM.tool, ARM.home[None])
+    thickest = max(np.flatnonzero(links == FOREARM), key=lambda k: radii[k])
+    x, y, z = ((starts[0, thickest] + ends[0, thickest]) / 2).tolist()
+    thing = bottle((x, y - float(radii[thickest]) - 0.035 - 0.04, z))
     figure, axes = panels(1, 4, (10.0, 2.6), width_ratios=(1, 1, 1, 1.8))
     steady = {}
     for axis, (name, preset) in zip(axes, cs.presets.PRESETS.items(), strict=False):

@@ -8,8 +8,8 @@ from drawing import COLOUR, INK, SOFT, draw_arm, panels, save
 from simulation import ARM, simulate
 
 import contactsafe as cs
-from contactsafe.report.scene import View
-from contactsafe.robot.shape import link_frames
+from contactsafe.report import View
+from contactsafe.robot import link_frames
 
 VIEW = View(target=(0.12, 0.06, 0.42), span=(0.95, 1.0), azimuth=0.35, elevation=0.25)
 PUSH = {"body": "link4", "point": (0.0, 0.0, 0.0), "force": (0.0, 15.0, 0.0), "start_s": 0.3, "stop_s": 1.8}

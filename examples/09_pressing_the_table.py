@@ -8,7 +8,7 @@ from drawing import COLOUR, panels, save
 from simulation import ARM, simulate, smooth
 
 import contactsafe as cs
-from contactsafe.sim.fixtures import workbench
+from contactsafe.sim import workbench
 
 DEEPEST_M, DOWN_S, DEEPER_S = 0.12, 1.0, 4.0
 TABLE_M = workbench().position[2]

@@ -8,7 +8,7 @@ import numpy as np
 from drawing import COLOUR, INK, SOFT, panels, save
 
 import contactsafe as cs
-from contactsafe.robot.payload import carrying
+from contactsafe.robot import carrying
 
 CRATE = cs.Payload(mass=2.5, com=np.array([0.03, 0.0, 0.05]), inertia=np.eye(3) * 0.01)
 ASKED_TICK = 2000

@@ -8,7 +8,7 @@ import numpy as np
 from drawing import COLOUR, panels, save
 
 import contactsafe  # noqa: F401  (makes the environment known)
-from contactsafe.vision.log_polar import RADIUS_M, RINGS, SECTORS, ground_of, log_polar_features
+from contactsafe.vision import RADIUS_M, RINGS, SECTORS, ground_of, log_polar_features
 
 
 def main(folder: str = ".") -> np.ndarray:

@@ -9,14 +9,14 @@ from drawing import COLOUR, INK, OBSTACLE, panels, save
 from matplotlib.patches import Circle
 
 import contactsafe  # noqa: F401  (makes the environment known)
-from contactsafe.tasks.insertion.scripted import SCRIPTED
+from contactsafe.tasks import task_by_name
 
 
 def main(folder: str = ".", seed: int = 2) -> dict[str, float]:
     """Insert one peg, draw it, and return the depth at the end, m, and the largest force of a step's mean, N."""
     envs = gymnasium.make_vec("contactsafe/Insertion-v0", num_envs=1, autoreset_mode="disabled")
     tasks = envs.unwrapped.tasks
-    spiral = SCRIPTED["spiral"](tasks.config, envs.unwrapped, seed)
+    spiral = task_by_name("insertion").scripted_policy("spiral", tasks.config, envs, seed)
     observation, _ = envs.reset(seed=seed)
     spiral.begin(0)
     path, depth, force = [], [], []

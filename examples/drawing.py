@@ -8,10 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from contactsafe.report.data import COLOURS
-from contactsafe.report.scene import View
-from contactsafe.robot.description import ArmDescription, Tool
-from contactsafe.robot.shape import arm_capsules, tip_box
+from contactsafe.report import COLOURS, View
+from contactsafe.robot import ArmDescription, Tool, arm_capsules, tip_box
 
 COLOUR = {name: on_light for name, (on_light, _) in COLOURS.items()}
 """Of the controllers, as in the report."""

@@ -5,9 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 import contactsafe as cs
-from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.worlds import Worlds
+from contactsafe.sim import WorldConfig, Worlds, trace_dtype
 
 ARM = cs.robots.panda()
 STIFFNESS = np.array([150.0] * 3 + [450.0] * 3)

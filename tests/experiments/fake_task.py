@@ -83,6 +83,7 @@ class Reaching:
     metrics = (Metric("away_mm", "distance reached", "mm", main=True, aim=Aim(at_least=1000 * GOAL_M)),)
     highlights = (Highlight("reaching", "away_mm", "Distance reached"),)
     panels = (Panel("distance", "m", lambda run: run.curves["away"]),)
+    arm = robots.panda()
     stage = Stage(PANDA, WIPER, level_rectangle((0.5, 0.0, 0.01), (0.5, 0.6)), {1: (200, 0, 0)})
 
     def episodes(self, controller, seeds):

@@ -14,7 +14,7 @@ from contactsafe.experiments.collision_motions import (
     sample_plant,
     scene_rng,
 )
-from contactsafe.experiments.collision_scenes import LINKS, sample_meetings, sample_obstacle
+from contactsafe.experiments.collision_scenes import met_links, sample_meetings, sample_obstacle
 from contactsafe.experiments.motions import Playback, record
 from contactsafe.experiments.surfaces import clearance
 from contactsafe.robot import robots
@@ -121,7 +121,7 @@ def test_obstacles_touch_the_arm_where_and_when_they_say(played):
         assert len({meeting.link for meeting in meetings}) == len(meetings) in (1, 2)
         for meeting in meetings:
             thing, at = meeting.obstacle, np.array(meeting.obstacle.position)
-            assert meeting.link in LINKS
+            assert meeting.link in met_links(ARM)
             assert clearance(ARM, trace["q"][:1], at) > thing.radius
             if motion.holds:
                 assert math.isfinite(thing.stiffness)

@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.joint_safety import OBSTACLES, forearm, place_before_forearm
 from contactsafe.robot import robots
+from contactsafe.robot.arm import arm_from_description
+from contactsafe.robot.franka import HAND
+from contactsafe.robot.panda import PANDA
 
 ARM = robots.panda()
 
@@ -25,5 +28,15 @@ def test_it_touches_the_forearms_middle_from_the_right(seed, name):
 
 
 def test_an_arm_without_description_has_no_forearm():
-    with pytest.raises(InvalidInputError, match=r"has no description to know its forearm by; give contactsafe\.robots"):
+    with pytest.raises(InvalidInputError, match=r"has no description of its links and tool; give contactsafe\.robots"):
         forearm(replace(ARM, description=None), ARM.home)
+
+
+def test_the_hand_of_a_four_joint_arm_was_taken_for_its_forearm():
+    four = arm_from_description(replace(PANDA, links=PANDA.links[:4], home=PANDA.home[:4]), HAND)
+    with pytest.raises(InvalidInputError) as error:
+        forearm(four, four.home)
+    assert str(error.value) == (
+        "arm 'panda' has 4 joints; this experiment names places on the links of an arm of 7, such as "
+        "contactsafe.robots.panda() or fr3()"
+    )

@@ -8,15 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.collision_scenes import LINKS
-from contactsafe.experiments.surfaces import clearance, description_and_tool, sample_surface_point
+from contactsafe.experiments.collision_scenes import met_links
+from contactsafe.experiments.surfaces import clearance, sample_surface_point
 from contactsafe.robot import robots
+from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.shape import arm_capsules, link_frames
 
 ARM = robots.panda()
 DESCRIPTION, TOOL = description_and_tool(ARM)
 seeds = st.integers(0, 10_000)
-links = st.sampled_from(LINKS)
+links = st.sampled_from(met_links(ARM))
 
 
 def posture(seed):
@@ -80,5 +81,5 @@ def test_far_away_it_is_the_distance_to_the_arm():
 
 
 def test_an_arm_without_description_is_refused():
-    with pytest.raises(InvalidInputError, match=r"has no description to know its surface by; give contactsafe\.robots"):
+    with pytest.raises(InvalidInputError, match=r"has no description of its links and tool; give contactsafe\.robots"):
         description_and_tool(replace(ARM, description=None))

@@ -114,7 +114,7 @@ def joint_safety():
     found = [Trial(t.scenario, t.controller, t.seed, t.metrics | {"met": 1.0}) for t in found]
     return Experiment(
         "joint-safety", "Joint safety", "What are the forces?", tuple(found), joint.METRICS, joint.HIGHLIGHTS,
-        tuple(recordings), (joint.CURVES,), Wiping.stage, policy=Wiping.policy,
+        tuple(recordings), (joint.CURVES,), Wiping().stage, policy=Wiping.policy,
     )  # fmt: skip
 
 
@@ -134,7 +134,8 @@ def task_safety():
     recordings = tuple(record("wiping", name, 8.0) for name in CONTROLLERS)
     return Experiment(
         "task-safety", "Task safety", "Does the tool press gently?", tuple(found), (*Wiping.metrics, *task.METRICS),
-        Wiping.highlights, recordings, (task.curves(Wiping.panels), task.IMPEDANCE), Wiping.stage, policy=Wiping.policy,
+        Wiping.highlights, recordings, (task.curves(Wiping.panels), task.IMPEDANCE), Wiping().stage,
+        policy=Wiping.policy,
     )  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def test_force_is_the_obstacles_or_the_tools(run):
 def test_a_film_begins_shortly_after_the_first_contact(fakes, run):
     run.trace["obstacle_force"][:] = 0.0
     run.trace["obstacle_force"][400:] = 9.0
-    found = json.loads(film_json(experiment(run), fakes.Wiping.stage))
+    found = json.loads(film_json(experiment(run), fakes.Wiping().stage))
     (scene,) = found["scenes"]
     assert scene["start"] == pytest.approx(0.7)
     assert scene["force"] == "contact force"
@@ -99,13 +99,13 @@ def test_a_film_begins_shortly_after_the_first_contact(fakes, run):
 
 
 def test_a_film_of_nothing_is_none(fakes, run):
-    stage = fakes.Wiping.stage
+    stage = fakes.Wiping().stage
     assert film_json(experiment(), stage) is None
     assert film_json(experiment(replace(run, trace=run.trace[:0])), stage) is None
 
 
 def test_runs_without_pictures_are_filmed_too(fakes, run):
-    found = json.loads(film_json(experiment(replace(run, pictures=None)), fakes.Wiping.stage))
+    found = json.loads(film_json(experiment(replace(run, pictures=None)), fakes.Wiping().stage))
     assert found["scenes"][0]["runs"][0]["pictures"] is None
     assert found["scenes"][0]["runs"][0]["cells"] == [1, 1]
     assert "<" not in json.dumps(found)

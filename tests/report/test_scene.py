@@ -32,7 +32,7 @@ def test_a_view_turns_and_does_not_distort(azimuth, elevation, seed):
 
 @pytest.fixture(scope="module")
 def stage(fakes):
-    return fakes.Wiping.stage
+    return fakes.Wiping().stage
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.robot.description import Inertia
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.description import Inertia, Tip
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.panda import PANDA
@@ -72,3 +73,21 @@ def test_two_points_make_a_dumbbell():
 
 def test_the_pad_hangs_on_the_hand():
     assert WIPER.inertia.mass == pytest.approx(HAND.inertia.mass + 0.1)
+
+
+@pytest.mark.parametrize(
+    ("made", "told"),
+    [
+        (((0.01, 0.01, 0.03), "sphere"), "tip shape = 'sphere'; choose box or cylinder"),
+        (((0.01, 0.0, 0.03),), "tip half_size = (0.01, 0.0, 0.03); give three lengths greater than 0, m"),
+        (((0.01, 0.03),), "tip half_size = (0.01, 0.03); give three lengths greater than 0, m"),
+        (
+            ((0.01, 0.03, 0.03), "cylinder"),
+            "tip half_size = (0.01, 0.03, 0.03); give a cylinder its radius twice, then half its length, m",
+        ),
+    ],
+)
+def test_tips_that_cannot_be_are_refused(made, told):
+    with pytest.raises(InvalidInputError) as error:
+        Tip(*made)
+    assert str(error.value) == told

@@ -86,7 +86,7 @@ def test_an_arm_nobody_described_is_refused():
     with pytest.raises(InvalidInputError) as caught:
         Worlds(replace(six(), description=None))
     assert str(caught.value) == (
-        "arm 'own scene' has no description to build a plant from; give contactsafe.robots.panda(), or one of "
+        "arm 'own scene' has no description of its links and tool; give contactsafe.robots.panda(), or one of "
         "robots.from_mjcf"
     )
 

@@ -67,7 +67,7 @@ def evaluate(arguments: Sequence[str]) -> None:
     side_by_side = max(n for n in range(1, most + 1) if asked.episodes % n == 0)
     env = make_vec(described.name, side_by_side, config, asked.engine)
     if bundle is None:
-        policy = described.scripted[asked.scripted](config, env, asked.seed)
+        policy = described.scripted_policy(asked.scripted, config, env, asked.seed)
     else:
         policy = Policy(bundle, getattr(env.unwrapped, "camera_homography", None))
     with progress("episodes", asked.episodes) as bar:

@@ -88,19 +88,6 @@ def seconds(value: Any) -> float:
         raise InvalidInputError(f"time is {type(value).__name__}, not a number; give seconds") from None
 
 
-def unit_quaternion(value: Any, name: str) -> np.ndarray:
-    """Check a quaternion w x y z to 1e-3 of unit length and normalise it, (4,).
-
-    Raises:
-        InvalidInputError: not four finite numbers, or not of unit length.
-    """
-    quat = finite_array(value, (4,), name)
-    norm = float(np.linalg.norm(quat))
-    if abs(norm - 1.0) > 1e-3:
-        raise InvalidInputError(f"{name} has length {norm:.4g}; give a unit quaternion w x y z (divide by its length)")
-    return quat / norm
-
-
 def numbers_of(target: Target) -> list:
     """Take down a target's numbers in whatever form is quickly compared: they may be changed in place."""
     pose = target.pose

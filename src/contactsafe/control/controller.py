@@ -12,7 +12,6 @@ from contactsafe.control.checks import (
     refuse_overload,
     seconds,
     shaped,
-    unit_quaternion,
     within_limit,
 )
 from contactsafe.control.config import ControllerConfig
@@ -25,7 +24,7 @@ from contactsafe.control.signals import Measurement, Output, Target, output_of
 from contactsafe.control.tick import tick_at
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.arm import Arm, Pose, finite_array
+from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm, unit_quaternion
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.payload import Payload, carrying, checked_payload
 
@@ -66,8 +65,7 @@ class Controller(Independent):
     def __init__(
         self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
     ) -> None:
-        if not isinstance(arm, Arm):
-            raise InvalidInputError(f"arm is {type(arm).__name__}; give an Arm such as contactsafe.robots.panda()")
+        require_arm(arm)
         config = safe() if config is None else config
         if not isinstance(config, ControllerConfig):
             raise InvalidInputError(

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contactsafe.control.config import ControllerConfig, value_from_text
 from contactsafe.core.errors import InvalidInputError, shown
 
-__all__ = ["PRESETS", "SAFE", "by_name", "paper", "safe", "vices"]
+__all__ = ["ABOUT", "PRESETS", "SAFE", "by_name", "paper", "safe", "vices"]
 
 
 def paper() -> ControllerConfig:
@@ -71,6 +71,14 @@ def safe() -> ControllerConfig:
 
 
 PRESETS: dict[str, Callable[[], ControllerConfig]] = {"vices": vices, "paper": paper, "safe": safe}
+
+ABOUT = {
+    "vices": "the baseline: variable impedance control (Martín-Martín et al. 2019) with a posture task, "
+    "blind to contact of the arm",
+    "paper": "the contact-aware controller with the parameters of its paper",
+    "safe": "this package's default: the paper's laws, fast detection, null-space damping and a bounded contact force",
+}
+"""Each in a few words."""
 
 
 def by_name(name: str) -> ControllerConfig:

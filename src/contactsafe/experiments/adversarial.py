@@ -13,7 +13,6 @@ from contactsafe.experiments.collision_scenes import sample_obstacle
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric
-from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
 from contactsafe.sim.obstacles import Obstacle
@@ -50,10 +49,10 @@ def adversarial(config: ExperimentConfig, progress: Progress | None = None) -> E
     """Run the experiment; it needs no policy.
 
     Args:
-        config: controllers and seeds; each trial is `TICKS` long.
+        config: controllers, arm and seeds; each trial is `TICKS` long.
         progress: told of every trial done.
     """
-    arm = robots.panda()
+    arm = config.arm
     trials: list[Trial] = []
     for name in config.controllers:
         for seeds in config.batches():

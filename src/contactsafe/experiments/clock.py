@@ -17,7 +17,6 @@ from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.late_worlds import SEEN, LatePlayback, LateWorlds
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.metrics import CONTACT_N, ZERO, Aim, Metric
-from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.worlds import MAX_TICKS
 
@@ -46,10 +45,10 @@ def clock(config: ExperimentConfig, progress: Progress | None = None) -> Experim
     """Run the experiment; it needs no policy.
 
     Args:
-        config: controllers and seeds.
+        config: controllers, arm and seeds.
         progress: told of every trial done.
     """
-    arm = robots.panda()
+    arm = config.arm
     scenes = {situation: [sample_scene(arm, situation, seed) for seed in config.seeds] for situation in SITUATIONS}
     trials: list[Trial] = []
     for name in config.controllers:

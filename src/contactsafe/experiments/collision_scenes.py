@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactsafe.experiments.collision_motions import Motion, scene_rng
-from contactsafe.experiments.surfaces import clearance, description_and_tool, sample_surface_point
-from contactsafe.robot.arm import Arm
+from contactsafe.experiments.surfaces import clearance, sample_surface_point
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.description import Vector3
 from contactsafe.robot.shape import link_frames
 from contactsafe.sim.obstacles import Obstacle
-
-LINKS = (2, 3, 4, 5, 6, 7, 8)
-"""Links that are met; 8 is the hand."""
 
 _CLEAR_M = 0.002
 
@@ -31,11 +28,16 @@ class Meeting:
 
     Attributes:
         obstacle: what is met.
-        link: of the arm, 2 … 8, 8 being the hand.
+        link: of the arm, 2 … n + 1, n + 1 being the tool.
     """
 
     obstacle: Obstacle
     link: int
+
+
+def met_links(arm: Arm) -> range:
+    """Return the links that are met, of an arm of n joints: 2 … n + 1, n + 1 being the tool."""
+    return range(2, arm.n + 2)
 
 
 def sample_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeting, ...]:
@@ -57,7 +59,7 @@ def sample_meetings(arm: Arm, motion: Motion, q_free: np.ndarray) -> tuple[Meeti
 
 
 def _sample_meeting(arm: Arm, motion: Motion, q_free: np.ndarray, rng: np.random.Generator) -> Meeting | None:
-    link = int(rng.choice(LINKS))
+    link = int(rng.choice(met_links(arm)))
     radius = rng.uniform(0.02, 0.06)
     thing = sample_obstacle(rng, radius, may_be_fixed=not motion.holds)
     speed, push_n = rng.uniform(0.05, 0.25), rng.uniform(2.0, 10.0)

@@ -19,7 +19,7 @@ from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, length, scalar
 from contactsafe.results.recording import Recording
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, require_arm
 from contactsafe.sim.worlds import Worlds
 
 NAME = "collisions"
@@ -43,11 +43,11 @@ def collisions(config: ExperimentConfig, progress: Progress | None = None) -> Ex
     """Run the battery; it needs no policy.
 
     Args:
-        config: controllers, seeds and plants.
+        config: controllers, arm, seeds and plants.
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    return run_battery(controllers, config.seeds, config.plants, progress)
+    return run_battery(controllers, config.seeds, config.plants, progress, config.arm)
 
 
 ENTRY = Entry(
@@ -64,6 +64,7 @@ def run_battery(
     seeds: Sequence[int],
     plants: Sequence[str] = PLANTS,
     progress: Progress | None = None,
+    arm: Arm | None = None,
 ) -> Experiment:
     """Put controllers through the same collisions. A seed's trial does not depend on the others.
 
@@ -72,6 +73,7 @@ def run_battery(
         seeds: one a scene: of motion, plant, obstacles and noise.
         plants: some of `PLANTS`.
         progress: told how many trials were just done.
+        arm: that collides; None for a Panda.
 
     Returns:
         A trial for each seed, plant and controller, recordings of the first seed, tables of the comparison and of the
@@ -85,7 +87,7 @@ def run_battery(
             f"{len(controllers)} controllers, {len(seeds)} seeds, plants {', '.join(plants)}; "
             f"give one or more of each, plants from {', '.join(PLANTS)}"
         )
-    arm = robots.panda()
+    arm = robots.panda() if arm is None else require_arm(arm)
     batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
     # Each batch steps in native threads; several at a time, so that one steps while another is being set up.
     pool = ThreadPoolExecutor(os.cpu_count())

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.results.experiment import Experiment
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, require_arm
 
 BATCH = 16
 """Most trials stepped together: bounds the memory that their traces take."""
@@ -32,6 +34,7 @@ class ExperimentConfig:
         minutes: simulated time in which detection counts false alarms, min.
         task: for experiments that run one.
         bundle: policy, for experiments that run one.
+        arm: that moves by a script, in experiments that run no task.
     """
 
     controllers: tuple[str, ...] = ("vices", "paper", "safe")
@@ -41,9 +44,11 @@ class ExperimentConfig:
     minutes: float = 60.0
     task: ExperimentTask | None = None
     bundle: Bundle | None = None
+    arm: Arm = field(default_factory=robots.panda)
 
     def __post_init__(self) -> None:
         """Refuse unknown controllers and empty experiments."""
+        require_arm(self.arm)
         if not self.controllers:
             raise InvalidInputError(f"no controller given; choose from {', '.join(presets.PRESETS)}")
         for name in self.controllers:

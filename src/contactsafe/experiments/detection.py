@@ -11,10 +11,10 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import false_alarms
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_trials, sample_strokes
-from contactsafe.experiments.pushes import CONTACT, LINKS, NAMED_AFTER_MS, STEP, push_trials
+from contactsafe.experiments.pushes import CONTACT, NAMED_AFTER_MS, STEP, push_trials, pushed_links
 from contactsafe.results.experiment import Experiment, Table, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric
-from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm
 
 NAME = "detection"
 QUESTION = (
@@ -41,13 +41,13 @@ def detection(config: ExperimentConfig, progress: Progress | None = None) -> Exp
     """Run the experiment; it needs no policy. Controllers that are blind to contact are left out.
 
     Args:
-        config: controllers, seeds and minutes.
+        config: controllers, arm, seeds and minutes.
         progress: told of every trial done.
 
     Raises:
         InvalidInputError: no controller reports contacts.
     """
-    arm, seeds = robots.panda(), config.seeds
+    arm, seeds = config.arm, config.seeds
     trials: list[Trial] = []
     for name, controller in reporting(config.controllers).items():
         for first in range(0, len(seeds), _BATCH):
@@ -60,7 +60,7 @@ def detection(config: ExperimentConfig, progress: Progress | None = None) -> Exp
             trials += false_alarm_trials(arm, name, controller, strokes[first : first + _BATCH])
             if progress:
                 progress(len(strokes[first : first + _BATCH]))
-    return Experiment(NAME, "Detection", QUESTION, tuple(trials), METRICS, tables=detection_tables(trials))
+    return Experiment(NAME, "Detection", QUESTION, tuple(trials), METRICS, tables=detection_tables(arm, trials))
 
 
 def reporting(names: Sequence[str]) -> dict[str, ControllerConfig]:
@@ -88,12 +88,12 @@ def _stroke_worlds(minutes: float) -> int:
     return math.ceil(60.0 * minutes / false_alarms.STROKES_S)
 
 
-def detection_tables(trials: Sequence[Trial]) -> tuple[Table, ...]:
+def detection_tables(arm: Arm, trials: Sequence[Trial]) -> tuple[Table, ...]:
     """Sum the false alarms up, and show for each controller which links were named."""
     by_name: dict[str, list[Trial]] = {}
     for trial in trials:
         by_name.setdefault(trial.controller, []).append(trial)
-    return (_alarm_table(by_name), *(_confusion(name, of_name) for name, of_name in by_name.items()))
+    return (_alarm_table(by_name), *(_confusion(arm, name, of_name) for name, of_name in by_name.items()))
 
 
 def _alarm_table(by_name: Mapping[str, list[Trial]]) -> Table:
@@ -123,16 +123,17 @@ def _alarm_table(by_name: Mapping[str, list[Trial]]) -> Table:
     )
 
 
-def _confusion(name: str, trials: Sequence[Trial]) -> Table:
+def _confusion(arm: Arm, name: str, trials: Sequence[Trial]) -> Table:
     kept = [t.metrics for t in trials if t.scenario == CONTACT and not t.metrics["reported_early"]]
     rows = []
-    for link in LINKS:
+    for link in pushed_links(arm):
         here = [metrics for metrics in kept if metrics["link"] == link]
         named = [int(metrics["link_named"]) for metrics in here]
         right = 100.0 * named.count(link) / len(here) if here else math.nan
         own = float(np.median([metrics["own_torque_nm"] for metrics in here])) if here else math.nan
-        rows.append((link, len(here), *(named.count(other) for other in range(8)), right, own))
-    columns = ("link", "contacts", "none named", *(f"{link} named" for link in range(1, 8)), "right (%)", "own (N m)")
+        rows.append((link, len(here), *(named.count(other) for other in range(arm.n + 1)), right, own))
+    named_links = (f"{link} named" for link in range(1, arm.n + 1))
+    columns = ("link", "contacts", "none named", *named_links, "right (%)", "own (N m)")
     early = sum(t.scenario == CONTACT and t.metrics["reported_early"] > 0 for t in trials)
     note = (
         f"Links isolated {NAMED_AFTER_MS} ms after the onset of 10 to 60 N. Own: median of the true torque on the "

@@ -7,13 +7,13 @@ import numpy as np
 
 from contactsafe.experiments.collision_motions import sample_plant, scene_rng
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.experiments.franka_links import PUSH_POINTS, require_franka_links
 from contactsafe.experiments.run import Run, run_policy, steps_in
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, component
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Recording
-from contactsafe.robot import robots
 from contactsafe.sim.config import REAL_SENSORS, WorldConfig
 
 NAME = "disturbance"
@@ -24,9 +24,6 @@ QUESTION = (
 PUSH_N = 25.0
 PUSH_S = (0.5, 2.0)
 DURATION_S = 2.5
-PUSH_POINTS = {4: (-0.0825, 0.12, 0.0), 5: (0.0, 0.0, -0.2), 6: (0.0, 0.0, 0.0)}
-"""Where each link is pushed: end of the forearm near the elbow, its middle, the wrist; in the link's frame, m."""
-
 AT_REST = "at rest"
 STIFFNESS = (75.0, 75.0, 75.0, 450.0, 450.0, 450.0)
 """K1, 1/s²: a soft tool, near the low end of what a policy may choose."""
@@ -64,6 +61,7 @@ def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> E
         progress: told of every trial done.
     """
     task = config.require_task()
+    require_franka_links(task.arm)
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for mode in modes(task):
@@ -110,7 +108,7 @@ def push_force(seed: int, link: int) -> np.ndarray:
 
 
 def _run(task: ExperimentTask, mode: str, controller: str, seeds: Sequence[int], link: int | None) -> Run:
-    n = robots.panda().n
+    n = task.arm.n
     worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), n), sensors=REAL_SENSORS) for seed in seeds]
     episodes, act = task.scripted(controller, seeds, worlds, STIFFNESS, works=mode == task.name)
     if link is not None:

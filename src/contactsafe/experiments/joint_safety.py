@@ -5,14 +5,14 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from contactsafe.control.codes import FREE
-from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
+from contactsafe.experiments.franka_links import FOREARM, require_franka_links
 from contactsafe.experiments.run import policy_for, run_policy, steps_in
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, largest, scalar
 from contactsafe.results.metrics import CONTACT_N, Aim, Highlight, Metric
 from contactsafe.results.recording import Recording
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import arm_capsules
 from contactsafe.sim.obstacles import Obstacle, bottle, thrust_meter
 
@@ -52,8 +52,6 @@ CURVES = Figure(
     caption="Force of the obstacle on the arm; external torque and observer's residual, the largest of all joints. "
     "Shown is the first seed with which every arm met it, if there is one.",
 )
-
-_FOREARM_LINK = 5
 
 
 def joint_safety(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
@@ -135,13 +133,14 @@ def place_before_forearm(arm: Arm, q: np.ndarray, make: Callable[..., Obstacle])
 
 
 def forearm(arm: Arm, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return middle, (3,) m, and radius, m, of the forearm's thickest capsule at q (n,) rad."""
-    if arm.description is None or arm.tool is None:
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no description to know its forearm by; give contactsafe.robots.panda()"
-        )
-    starts, ends, radii, links = arm_capsules(arm.description, arm.tool, q[None])
-    of_link = np.flatnonzero(np.asarray(links) == _FOREARM_LINK)
+    """Return middle, (3,) m, and radius, m, of the forearm's thickest capsule at q (n,) rad.
+
+    Raises:
+        InvalidInputError: the arm is not built of links as Franka's are, or nobody says of which.
+    """
+    require_franka_links(arm)
+    starts, ends, radii, links = arm_capsules(*description_and_tool(arm), q[None])
+    of_link = np.flatnonzero(np.asarray(links) == FOREARM)
     thickest = of_link[np.argmax(radii[of_link])]
     return (starts[0, thickest] + ends[0, thickest]) / 2, float(radii[thickest])
 

@@ -10,9 +10,9 @@ from contactsafe.control.codes import FREE
 from contactsafe.control.config import ControllerConfig
 from contactsafe.experiments.collision_motions import sample_motion, scene_rng
 from contactsafe.experiments.motions import Playback
-from contactsafe.experiments.surfaces import clearance, description_and_tool, sample_surface_point
+from contactsafe.experiments.surfaces import clearance, sample_surface_point
 from contactsafe.results.experiment import Trial
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import link_frames
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ, Worlds
@@ -22,12 +22,16 @@ STEP_NM = 3.0
 """Largest joint torque of a step."""
 
 FORCE_N = (10.0, 60.0)
-LINKS = (3, 4, 5, 6, 7)
 NAMED_AFTER_MS = 30
 """When the reported link is looked at, since the onset."""
 
 _LEVER_M = 0.03  # least joint torque of a newton for a step: 3 N m take at most 100 N
 _AFTER_STEPS = 4  # policy steps recorded from the onset on: 66 or 67 ms
+
+
+def pushed_links(arm: Arm) -> range:
+    """Return the links that are pushed: all from the third on, where a push moves the joints of the base well."""
+    return range(3, arm.n + 1)
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str
     """
     origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
     while True:
-        link = int(rng.choice(LINKS))
+        link = int(rng.choice(pushed_links(arm)))
         point, normal = sample_surface_point(arm, link, rng)
         size = math.exp(rng.uniform(*np.log(FORCE_N)))
         place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal

@@ -2,23 +2,8 @@
 
 import numpy as np
 
-from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.arm import Arm
-from contactsafe.robot.description import ArmDescription, Tool
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import arm_capsules
-
-
-def description_and_tool(arm: Arm) -> tuple[ArmDescription, Tool]:
-    """Return what an arm was built from.
-
-    Raises:
-        InvalidInputError: it was not built from a description.
-    """
-    if arm.description is None or arm.tool is None:
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no description to know its surface by; give contactsafe.robots.panda()"
-        )
-    return arm.description, arm.tool
 
 
 def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

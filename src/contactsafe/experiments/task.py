@@ -93,6 +93,7 @@ class ExperimentTask(Protocol):
         highlights: of them, for scenarios named `name`.
         panels: of its curves, plotted beside the tool's force.
         stage: on which it is filmed.
+        arm: that works.
     """
 
     name: str
@@ -101,6 +102,7 @@ class ExperimentTask(Protocol):
     highlights: tuple[Highlight, ...]
     panels: tuple[Panel, ...]
     stage: Stage
+    arm: Arm
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> Episodes:
         """Return held-out episodes, begun."""

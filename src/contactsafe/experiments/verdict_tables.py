@@ -89,7 +89,10 @@ def _worst(
     )
     columns = ("seed", "scene", "link", "kN/m", f"peak (N), {name}", f"peak (N), {baseline}", "replay")
     title = f"The worst trials of {name}: peaks furthest above those of {baseline}"
-    note = "Of two obstacles the stiffer one; 1000 kN/m stands for one that cannot move. Link 8 is the hand."
+    note = (
+        "Of two obstacles the stiffer one; 1000 kN/m stands for one that cannot move. The link after the arm's last is "
+        "the tool."
+    )
     return Table(f"worst_{name}", title, columns, rows, note)
 
 

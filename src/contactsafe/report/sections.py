@@ -5,6 +5,7 @@ from html import escape
 from typing import Any
 
 import contactsafe
+from contactsafe.control import presets
 from contactsafe.report import data, strip, tables
 from contactsafe.report.data import RunInfo
 from contactsafe.report.film import film_json
@@ -14,21 +15,16 @@ from contactsafe.results.experiment import Experiment
 from contactsafe.results.figures import Figure
 from contactsafe.results.recording import Recording
 
-ABOUT = {
-    "vices": "the baseline: variable impedance control (Martín-Martín et al. 2019) with a posture task, "
-    "blind to contact of the arm",
-    "paper": "the contact-aware controller with the parameters of its paper",
-    "safe": "this package's default: the paper's laws, fast detection, null-space damping and a bounded contact force",
-}
-"""The known controllers in a few words."""
-
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
 
 def parts(experiments: Sequence[Experiment], names: Sequence[str], info: RunInfo | Mapping[str, Any]) -> dict[str, str]:
     """Return every piece of the page's template by name, as HTML."""
     plotter = Plotter(names)
-    key = [f"<dt {tables.coloured(name)}>{escape(name)}</dt><dd>{escape(ABOUT.get(name, ''))}</dd>" for name in names]
+    key = [
+        f"<dt {tables.coloured(name)}>{escape(name)}</dt><dd>{escape(presets.ABOUT.get(name, ''))}</dd>"
+        for name in names
+    ]
     return {
         "version": escape(str(info.get("version", contactsafe.__version__))),
         **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers")),

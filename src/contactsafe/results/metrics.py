@@ -7,7 +7,7 @@ from typing import Any
 from contactsafe.results.spread import Spread
 
 CONTACT_N = 0.5
-"""Force above which a tick counts as contact, N."""
+"""Force above which a tick, or a policy step by its largest, counts as contact, N."""
 
 BASELINE = "vices"
 """The controller that the others are compared with."""

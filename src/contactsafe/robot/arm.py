@@ -1,7 +1,7 @@
 """An arm as the controller knows it: a nominal model, its limits, its tool."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -172,9 +172,47 @@ def finite_array(value: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndar
     return array
 
 
+def unit_quaternion(value: ArrayLike, name: str) -> np.ndarray:
+    """Check a quaternion w x y z to 1e-3 of unit length and normalise it, (4,).
+
+    Raises:
+        InvalidInputError: not four finite numbers, or not of unit length.
+    """
+    quat = finite_array(value, (4,), name)
+    norm = float(np.linalg.norm(quat))
+    if abs(norm - 1.0) > 1e-3:
+        raise InvalidInputError(f"{name} has length {norm:.4g}; give a unit quaternion w x y z (divide by its length)")
+    return quat / norm
+
+
 def finite_range(q_min: np.ndarray, q_max: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a joint range to choose postures from, (n,) and (n,), rad: one turn where a joint turns without end."""
     return np.where(np.isfinite(q_min), q_min, -np.pi), np.where(np.isfinite(q_max), q_max, np.pi)
+
+
+def require_arm(value: Any) -> Arm:
+    """Return what was given for an arm.
+
+    Raises:
+        InvalidInputError: it is none.
+    """
+    if not isinstance(value, Arm):
+        raise InvalidInputError(f"arm is {type(value).__name__}; give an Arm such as contactsafe.robots.panda()")
+    return value
+
+
+def description_and_tool(arm: Arm) -> tuple[ArmDescription, Tool]:
+    """Return what an arm and its tool are built from.
+
+    Raises:
+        InvalidInputError: nobody says.
+    """
+    if arm.description is None or arm.tool is None:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has no description of its links and tool; give contactsafe.robots.panda(), or one of "
+            "robots.from_mjcf"
+        )
+    return arm.description, arm.tool
 
 
 def arm_from_description(description: ArmDescription, tool: Tool) -> Arm:

@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
+
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """Unit quaternion, w x y z."""
@@ -112,6 +114,18 @@ class Tip:
 
     half_size: Vector3
     shape: Literal["box", "cylinder"] = "box"
+
+    def __post_init__(self) -> None:
+        """Refuse a tip that cannot be."""
+        if self.shape not in ("box", "cylinder"):
+            raise InvalidInputError(f"tip shape = {self.shape!r}; choose box or cylinder")
+        size = np.atleast_1d(np.asarray(self.half_size, dtype=float))
+        if size.shape != (3,) or not ((size > 0.0) & np.isfinite(size)).all():
+            raise InvalidInputError(f"tip half_size = {self.half_size}; give three lengths greater than 0, m")
+        if self.shape == "cylinder" and size[0] != size[1]:
+            raise InvalidInputError(
+                f"tip half_size = {self.half_size}; give a cylinder its radius twice, then half its length, m"
+            )
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
-from contactsafe.core.errors import InvalidInputError, UnreachableError
+from contactsafe.core.errors import UnreachableError
 from contactsafe.core.files import readable
 from contactsafe.core.linalg import dot, matvec, matvec_t, spd_inverse
 from contactsafe.core.rotation import orientation_error, quat_to_matrix
-from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range
+from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range, unit_quaternion
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture, posture_rule
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
@@ -168,15 +168,7 @@ def _error_words(position_error_m: float, rotation_error_rad: float) -> str:
 
 
 def _checked_pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-    position = finite_array(pose.position, (3,), "pose.position")
-    quat = finite_array(pose.quat, (4,), "pose.quat")
-    norm = float(np.linalg.norm(quat))
-    if abs(norm - 1) > 1e-3:
-        raise InvalidInputError(
-            f"pose.quat has length {norm:.4g}; a unit quaternion w x y z has length 1 within 0.001; "
-            "divide it by its length"
-        )
-    return position, quat / norm
+    return finite_array(pose.position, (3,), "pose.position"), unit_quaternion(pose.quat, "pose.quat")
 
 
 def _reached(error: tuple[float, float]) -> bool:

@@ -18,12 +18,12 @@ from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.files import readable
 from contactsafe.core.rotation import quat_multiply, quat_to_matrix
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.mjcf import TOOL_SITE, numbers
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.scene import build_plant, described, loaded, perturbed
+from contactsafe.sim.scene import build_plant, loaded, perturbed
 
 GEAR = 1000.0
 """Turns of a rotor for one of its joint."""
@@ -124,7 +124,7 @@ class BulletBackend(Unique):
 
     def __init__(self, arm: Arm, config: WorldConfig, tick_s: float):
         self._bullet = import_pybullet()
-        description, tool = described(arm)
+        description, tool = description_and_tool(arm)
         if config.obstacles:
             raise InvalidInputError(
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"

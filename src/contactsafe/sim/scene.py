@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.description import ArmDescription, Inertia, Tool
 from contactsafe.robot.mjcf import FLANGE_SITE, TIP_GEOM, arm_body, model_root, numbers
 from contactsafe.sim.config import PlantConfig, WorldConfig, per_joint
@@ -41,7 +41,7 @@ def build_plants(arm: Arm, configs: list[WorldConfig], shared: bool) -> list[muj
 
 def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     """Write the MJCF of the world around an arm."""
-    description, tool = described(arm)
+    description, tool = description_and_tool(arm)
     root = model_root("contactsafe world")
     for option in root.iter("option"):
         option.set("gravity", numbers(arm.model.opt.gravity))
@@ -67,20 +67,6 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     _sensors(root, tool, config)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
-
-
-def described(arm: Arm) -> tuple[ArmDescription, Tool]:
-    """Return what an arm and its tool are built from.
-
-    Raises:
-        InvalidInputError: nobody says.
-    """
-    if arm.description is None or arm.tool is None:
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no description to build a plant from; give contactsafe.robots.panda(), or one of "
-            "robots.from_mjcf"
-        )
-    return arm.description, arm.tool
 
 
 def perturbed(description: ArmDescription, plant: PlantConfig) -> ArmDescription:

@@ -16,7 +16,7 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_records, state_dict
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, require_arm
 from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim import mujoco_backend
 from contactsafe.sim.backend import Backend, StepArrays, run_backend
@@ -112,7 +112,7 @@ class Worlds(Independent):
         shared: bool = True,
         backend: Callable[[Arm, WorldConfig, float], Backend] | None = None,
     ):
-        self.arm, self.n = arm, n
+        self.arm, self.n = require_arm(arm), n
         self.configs = _one_each(world, n)
         _check_tick(controller)
         self.models = build_plants(arm, self.configs, shared)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from contactsafe.tasks.base.figures import FIGURES, Episodes, Figure, names
+from contactsafe.tasks.base.figures import FIGURES, Episodes, Figure, names, total
 
 SUCCEEDED = {"success": True, "time_s": 4.0, "peak_force_n": 10.0, "return": 1.0}
 FAILED = {"success": False, "time_s": 20.0, "peak_force_n": 30.0, "return": -1.0}
@@ -32,6 +32,11 @@ def test_what_the_records_say():
     assert found["contact_force_median_n"] == 2.0
     assert found["contact_fraction"] == 0.5
     assert found["return_mean"] == 0.0
+
+
+def test_a_total_counts_the_episodes_in_which_something_was_so():
+    records = [{**SUCCEEDED, "touched": touched} for touched in (True, False, True)]
+    assert total("touched")(Episodes(records, np.zeros(0), 1)) == 2
 
 
 def test_a_policy_that_never_succeeds_nor_touches_still_has_figures():

@@ -1,17 +1,28 @@
 """Somebody leans on the arm while it works: in turn, within the ranges, the same for the same seed."""
 
 import itertools
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.robot.arm import arm_from_description
+from contactsafe.robot.franka import HAND
+from contactsafe.robot.panda import PANDA
+from contactsafe.tasks.base.pushes import Pushes, PushSchedule
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 PUSHES = Pushes(force_n=(20.0, 25.0), lasting_s=(0.2, 0.4), pause_s=(0.1, 0.2), links=(4, 5))
+
+
+def arm_of(n):
+    """An arm of n joints, those of the Panda over again."""
+    links, home = (2 * PANDA.links)[:n], (2 * PANDA.home)[:n]
+    return arm_from_description(replace(PANDA, links=links, home=home), HAND)
 
 
 def pushed(steps=120, seed=3):
@@ -50,5 +61,28 @@ def test_pushes_that_cannot_be_are_refused():
         Pushes(force_n=(30.0, 5.0))
     assert str(error.value) == "pushes force_n = (30.0, 5.0); give (low, high) with 0 ≤ low ≤ high"
     with pytest.raises(InvalidInputError) as error:
-        Pushes(links=(8,))
-    assert str(error.value) == "pushes links = (8,); give some of 1 to 7"
+        Pushes(links=(0,))
+    assert str(error.value) == "pushes links = (0,); give numbers from 1 on, or None for the middle ones"
+    with pytest.raises(InvalidInputError) as error:
+        Pushes(links=())
+    assert str(error.value) == "pushes links = (); give numbers from 1 on, or None for the middle ones"
+
+
+@pytest.mark.parametrize("n", range(1, 12))
+def test_every_link_of_an_arm_of_any_number_of_joints_may_be_pushed_and_no_other(n):
+    arm = arm_of(n)
+    for link in range(1, n + 1):
+        assert Pushes(links=(link,)).links_of(arm) == (link,)
+    with pytest.raises(InvalidInputError, match=rf"arm 'panda' has {n}, give some of those$"):
+        Pushes(links=(1, n + 1)).links_of(arm)
+    chosen = Pushes().links_of(arm)
+    assert chosen
+    assert set(chosen) <= set(range(1, n + 1))
+
+
+def test_the_eighth_link_of_nine_is_pushed():
+    pushed_bodies = []
+    worlds = SimpleNamespace(arm=arm_of(9), n=1, records=np.zeros(1, [("tick", int)]))
+    worlds.push = lambda i, body, *rest: pushed_bodies.append(body)
+    PushSchedule(worlds, Pushes(links=(8,))).begin(0, np.random.default_rng(0))
+    assert pushed_bodies == ["link8"]

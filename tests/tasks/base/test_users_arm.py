@@ -2,6 +2,7 @@
 
 import copy
 import functools
+from dataclasses import replace
 
 import gymnasium
 import mujoco
@@ -10,12 +11,14 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import contactsafe as cs
+from contactsafe.robot.panda import PANDA
 from contactsafe.robot.robots import Tip
-from contactsafe.tasks import make_vec
+from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.base.pushes import Pushes
+from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.tasks import InsertionTasks
 from contactsafe.tasks.wiping.config import BoardConfig, WipingConfig
 from contactsafe.tasks.wiping.randomisation import Randomisation
-from contactsafe.tasks.wiping.scripted import scripted_policy
 
 ROBOT = """
 <mujoco model="palletiser">
@@ -77,7 +80,7 @@ def test_it_wipes_a_raster_for_eight_seconds_without_fault():
     config = WipingConfig(episode_s=8.0)
     envs = make_vec("wiping", 2, config, arm=robot())
     seen, _ = envs.reset(seed=1)
-    raster = scripted_policy("raster", config, envs, 0)
+    raster = task_by_name("wiping").scripted_policy("raster", config, envs, 0)
     for i in range(2):
         raster.begin(i)
     for _ in range(479):
@@ -139,12 +142,12 @@ LIGHTER = WipingConfig(randomisation=Randomisation(payload_kg=(-0.3, 0.2)))
 REFUSED = {
     "no tip": (
         None, WipingConfig(),
-        "arm 'palletiser' has no pad to wipe with; give it a box for a tip: the tool robots.WIPER, or "
+        "arm 'palletiser' has no tip, and task 'wiping' needs a box; give it the tool robots.WIPER, or "
         "robots.from_mjcf(..., tip=robots.Tip((0.02, 0.02, 0.01)))",
     ),
     "round tip": (
         Tip((0.02, 0.02, 0.02), "cylinder"), WipingConfig(),
-        "arm 'palletiser' has no pad to wipe with; give it a box for a tip: the tool robots.WIPER, or "
+        "arm 'palletiser' has a cylinder for a tip, and task 'wiping' needs a box; give it the tool robots.WIPER, or "
         "robots.from_mjcf(..., tip=robots.Tip((0.02, 0.02, 0.01)))",
     ),
     "out of reach": (
@@ -171,6 +174,94 @@ def test_what_a_task_cannot_do_with_an_arm_is_said_in_one_line(name):
     assert str(caught.value) == text
 
 
-def test_insertion_needs_a_tip():
-    with pytest.raises(cs.ContactSafeError, match=r"has no tip to work with; give it a tool that has"):
-        make_vec("insertion", 1, arm=robot(None)).reset(seed=0)
+NEEDS_PEG = (
+    "task 'insertion' needs a cylinder; give it the tool contactsafe.tasks.insertion.scene.PEG, or "
+    'robots.from_mjcf(..., tip=robots.Tip((0.01, 0.01, 0.03), "cylinder"))'
+)
+NO_PEG = {
+    "no tip": (None, f"arm 'palletiser' has no tip, and {NEEDS_PEG}"),
+    "a box": (PAD, f"arm 'palletiser' has a box for a tip, and {NEEDS_PEG}"),
+    "thick": (
+        Tip((0.05, 0.05, 0.03), "cylinder"),
+        "arm 'palletiser' has a peg of radius 0.05 m, 0.06 m long; give it a radius of 0.002 to 0.03 m, and a length "
+        "of depth_m = 0.025 m or more",
+    ),
+    "short": (
+        Tip((0.01, 0.01, 0.01), "cylinder"),
+        "arm 'palletiser' has a peg of radius 0.01 m, 0.02 m long; give it a radius of 0.002 to 0.03 m, and a length "
+        "of depth_m = 0.025 m or more",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NO_PEG)
+def test_an_arm_without_a_peg_was_taken_for_one_of_20_mm(name):
+    tip, text = NO_PEG[name]
+    with pytest.raises(cs.ContactSafeError) as caught:
+        make_vec("insertion", 1, arm=robot(tip))
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("radius", [0.006, 0.015])
+def test_the_hole_is_as_wide_as_the_arms_own_peg(radius):
+    config = InsertionConfig(error_m=0.0, tilt_rad=0.0)
+    tasks = InsertionTasks(config, 1, seed=0, arm=robot(Tip((radius, radius, 0.03), "cylinder")))
+    tasks.reset(0, np.random.default_rng(0))
+    model = tasks.worlds.models[0]
+    wall, mouth = model.geom("wall0"), np.array(config.mouth)
+    np.testing.assert_allclose(wall.pos[0] - wall.size[0], radius + config.clearance_m)
+    assert tasks.hole_radius == radius + config.clearance_m
+    down = np.zeros((1, 18))
+    down[:, 2] = -0.4
+    for _ in range(300):
+        tasks.step(down)
+    assert np.linalg.norm(tasks.tasks["pose"][0, :2] - mouth[:2]) < 0.003
+    assert tasks.tasks["depth"][0] > 0.01
+    tasks.worlds.close()
+
+
+BASE = 'name="column" pos="-0.1 0 0.05">'
+FAR_FROM = "task '{}' needs the tool at {} m, pointing down, where arm 'palletiser' does not reach; change {}"
+FAR_FROM_BOARD = FAR_FROM.format("wiping", "[0.400, -0.100, 0.040]", "board.centre of WipingConfig")
+FAR_FROM_MOUTH = FAR_FROM.format("insertion", "[0.495, -0.005, 0.065]", "mouth of InsertionConfig")
+NO_ARM = {
+    "a description": ("wiping", lambda: PANDA, "arm is ArmDescription; give an Arm such as contactsafe.robots.panda()"),
+    "a name": ("wiping", lambda: "panda", "arm is str; give an Arm such as contactsafe.robots.panda()"),
+    "a mobile base": (
+        "wiping", lambda: scene_of(ROBOT.replace(BASE, BASE + "<freejoint name='float'/>")),
+        "joint 'float' is of type free; the arm's are hinges: give joints=[...] without it, to lock it",
+    ),
+    "a base on a rail": (
+        "wiping", lambda: scene_of(ROBOT.replace(BASE, BASE + "<joint name='rail' type='slide'/>")),
+        "joint 'rail' is of type slide; the arm's are hinges: give joints=[...] without it, to lock it",
+    ),
+    "three joints": (
+        "wiping", lambda: scene_of(ROBOT, joints=["turn", "shoulder", "elbow"]),
+        f"{FAR_FROM_BOARD}, or give the arm another base",
+    ),
+    "a board out of reach": (
+        "wiping", lambda: scene_of(ROBOT.replace("-0.1 0 0.05", "-2 0 0.05")),
+        f"{FAR_FROM_BOARD}, or give the arm another base",
+    ),
+    "a hole out of reach": (
+        "insertion", lambda: scene_of(ROBOT.replace("-0.1 0 0.05", "-2 0 0.05")),
+        f"{FAR_FROM_MOUTH}, or give the arm another base",
+    ),
+    "no description": (
+        "wiping", lambda: replace(robot(), description=None),
+        "arm 'palletiser' has no description of its links and tool; give contactsafe.robots.panda(), or one of "
+        "robots.from_mjcf",
+    ),
+}  # fmt: skip
+
+
+def scene_of(text, joints=None):
+    return cs.robots.from_mjcf(mujoco.MjModel.from_xml_string(text), site="mop", joints=joints, tip=PAD)
+
+
+@pytest.mark.parametrize("name", NO_ARM)
+def test_an_arm_that_a_task_cannot_work_with_is_refused_in_one_line(name):
+    task, make, text = NO_ARM[name]
+    with pytest.raises(cs.ContactSafeError) as caught:
+        make_vec(task, 1, arm=make())
+    assert str(caught.value) == text

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
 from contactsafe.tasks.insertion.config import InsertionConfig
@@ -116,6 +116,7 @@ def test_scripts_are_gentle_and_a_search_finds_more_than_going_straight_down():
         ({"clearance_m": 0.0}, "clearance_m = 0.0; give 0.00001 to 0.005 m, between the radii"),
         ({"depth_m": 0.04}, "depth_m = 0.04; give more than 0 and at most 0.03 m"),
         ({"error_m": -1.0}, "error_m = -1.0, tilt_rad = 0.035; give at most 0.02 m and 0.2 rad, none negative"),
+        ({"start_m": (0.02, 0.01)}, "start_m = (0.02, 0.01); give (low, high) with 0 ≤ low ≤ high ≤ 0.2 m"),
         ({"friction": (0.5, 0.1)}, "friction = (0.5, 0.1); give (low, high) with 0 ≤ low ≤ high ≤ 2"),
         ({"episode_s": 0}, "episode_s = 0; give seconds, from 1/60 to 86400, a day"),
     ],
@@ -124,6 +125,20 @@ def test_holes_that_cannot_be_are_refused(fields, told):
     with pytest.raises(InvalidInputError) as error:
         InsertionConfig(**fields)
     assert str(error.value) == told
+
+
+@pytest.mark.parametrize(
+    ("height", "told"),
+    [
+        ("high", "height is str, not numbers; give one finite number"),
+        (float("nan"), "height = nan; every number must be finite"),
+        (10.0, "task 'insertion' needs the tool at"),
+    ],
+)
+def test_a_height_that_cannot_be_is_refused_in_one_line(height, told):
+    with pytest.raises(ContactSafeError) as error:
+        begun(height=height)
+    assert str(error.value).startswith(told)
 
 
 def test_options_become_the_configuration():

@@ -18,7 +18,7 @@ MOUTH = (0.5, 0.0, 0.05)
 def peg_in_block(clearance_m):
     """A model of the block and a peg that can be put anywhere, in free space."""
     root = mujoco.MjSpec()
-    boxes = block((0.0, 0.0, 0.0), clearance_m).boxes
+    boxes = block((0.0, 0.0, 0.0), PEG_RADIUS + clearance_m).boxes
     for box in boxes:
         root.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX, size=box.half_size, pos=box.centre, quat=box.quat, name=box.name
@@ -68,7 +68,7 @@ def test_the_floor_is_where_the_hole_ends():
 
 def test_a_peg_that_lies_on_the_block_was_found_10_mm_deep_in_it():
     # With several contacts a pair, mujoco 4.0.0 did so in one look of some thousands: 274 N for a tick.
-    model = build_plant(robots.panda(PEG), WorldConfig(fixtures=(table(), block(MOUTH, 0.0005))))
+    model = build_plant(robots.panda(PEG), WorldConfig(fixtures=(table(), block(MOUTH, PEG_RADIUS + 0.0005))))
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_MULTICCD
     model, data = peg_in_block(0.0005)
     rng = np.random.default_rng(0)

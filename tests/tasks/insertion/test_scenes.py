@@ -1,12 +1,16 @@
 """The insertion task under the experiments: obstacles come to the arm, the script goes in, the hole is drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from contactsafe.experiments.joint_safety import place_before_forearm
 from contactsafe.experiments.run import run_policy
+from contactsafe.robot import robots
+from contactsafe.robot.robots import Tip
 from contactsafe.sim.config import NO_NOISE, WorldConfig
 from contactsafe.sim.obstacles import bottle
-from contactsafe.tasks.insertion.scene import PEG_RADIUS
+from contactsafe.tasks.insertion.scene import PEG
 from contactsafe.tasks.insertion.scenes import HOLE, Insertion
 
 STILL = np.zeros((2, 18))
@@ -15,7 +19,7 @@ STILL = np.zeros((2, 18))
 def test_the_hole_is_drawn_where_it_is():
     episodes = Insertion().episodes("safe", [0, 1])
     pictures = episodes.pictures()
-    radius = 1000 * (PEG_RADIUS + episodes.tasks.config.clearance_m)
+    radius = 1000 * episodes.tasks.hole_radius
     for picture, mouth in zip(pictures, episodes.tasks.tasks["mouth"], strict=True):
         cells = np.argwhere(picture == HOLE)
         assert abs(len(cells) - np.pi * radius**2) < 0.05 * np.pi * radius**2
@@ -30,6 +34,21 @@ def test_an_obstacle_comes_to_the_forearm_and_is_met():
     for trace in run.traces:
         assert trace["obstacle_force"][:500].max() == 0.0
         assert trace["obstacle_force"].max() > 2.0
+
+
+def test_scenes_of_another_arm_were_those_of_the_panda():
+    arm = robots.fr3(replace(PEG, tip=Tip((0.008, 0.008, 0.03), "cylinder")))
+    task = Insertion(arm=arm)
+    assert (task.stage.arm, task.stage.tool) == (arm.description, arm.tool)
+    for episodes in (
+        task.episodes("safe", [0]),
+        task.towards_obstacle("safe", [0], lambda arm, q: bottle(place_before_forearm(arm, q, bottle))),
+        task.scripted("safe", [0], [WorldConfig()], (150.0,) * 3 + (450.0,) * 3, works=True)[0],
+    ):
+        assert episodes.arm is arm
+        cells = np.count_nonzero(episodes.pictures() == HOLE)
+        assert abs(cells - np.pi * 8.5**2) < 0.05 * np.pi * 8.5**2
+        episodes.worlds.close()
 
 
 def test_the_script_goes_in_and_the_rest_holds_still():

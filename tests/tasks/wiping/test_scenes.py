@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from contactsafe.policy.action_config import ActionConfig
+from contactsafe.robot import robots
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import bottle
 from contactsafe.tasks.wiping.board import BoardConfig
+from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.scenes import LURE_CENTRE, LURE_SIZE, OBSTACLE_AT, Wiping, held_out, strokes
 from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
@@ -58,6 +60,23 @@ def test_the_lure_lies_on_the_right_and_the_tool_starts_on_the_left():
     assert episodes.worlds.configs[0].obstacles[0] == far_away(None, None)
 
 
+def test_scenes_of_another_arm_were_those_of_the_panda():
+    arm, board = robots.fr3(), BoardConfig(centre=(0.45, 0.02, 0.01))
+    task = Wiping(WipingConfig(board=board), arm)
+    assert (task.stage.arm, task.stage.tool) == (arm.description, arm.tool)
+    np.testing.assert_allclose(np.mean(task.stage.corners, axis=0), board.centre)
+    seen = []
+    scenes = [
+        task.episodes("safe", [0]),
+        task.towards_obstacle("safe", [0], lambda arm, q: seen.append(arm) or far_away(arm, q)),
+        task.scripted("safe", [0], [WorldConfig()], STIFFNESS, works=True)[0],
+    ]
+    for episodes in scenes:
+        assert episodes.arm is arm
+        episodes.worlds.close()
+    assert seen == [arm]
+
+
 @pytest.mark.parametrize("works", [False, True])
 def test_a_script_holds_above_the_board_or_strokes_on_it(works):
     episodes, act = TASK.scripted("safe", [0], [WorldConfig()], STIFFNESS, works)
@@ -75,7 +94,7 @@ def test_a_script_holds_above_the_board_or_strokes_on_it(works):
 def test_strokes_add_up_to_their_half_length_within_actions():
     action = ActionConfig()
     act = strokes(action)
-    steps = np.array([act({"pose": np.zeros((1, 6))})[0] for _ in range(75)])  # a quarter of a period
+    steps = np.array([act({"target": np.zeros((1, 18))})[0] for _ in range(75)])  # a quarter of a period
     assert np.abs(steps).max() <= 1.0
     assert steps[:, 1].sum() * action.translation[1] == pytest.approx(0.08)
     assert steps[:, 2].sum() * action.translation[2] == pytest.approx(-0.005)

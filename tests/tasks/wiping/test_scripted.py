@@ -6,17 +6,19 @@ import pytest
 
 import contactsafe  # noqa: F401  (registers the task)
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.tasks import task_by_name
 from contactsafe.tasks.base.evaluation import evaluate_policy
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.scripted import DESCENT_M_S, Raster, scripted_policy
+from contactsafe.tasks.wiping.scripted import DESCENT_M_S, Raster
 
 CONFIG = WipingConfig()
+TASK = task_by_name("wiping")
 
 
 def results(name, episodes=4):
     env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=episodes, config=CONFIG)
     try:
-        return evaluate_policy(scripted_policy(name, CONFIG, env, 0), env, episodes, seed=3)
+        return evaluate_policy(TASK.scripted_policy(name, CONFIG, env, 0), env, episodes, seed=3)
     finally:
         env.close()
 
@@ -34,7 +36,7 @@ def test_random_actions_wipe_next_to_nothing():
 
 def test_a_blank_mask_leaves_the_servo_where_it_is():
     env = gymnasium.make_vec("contactsafe/Wiping-v0", num_envs=1, config=CONFIG)
-    servo = scripted_policy("nearest-ink", CONFIG, env, 0)
+    servo = TASK.scripted_policy("nearest-ink", CONFIG, env, 0)
     seen, _ = env.reset(seed=1)
     seen["mask"][:] = 255
     np.testing.assert_allclose(servo.act(seen)[0, :2], 0.0, atol=1e-6)
@@ -58,5 +60,5 @@ def test_lands_slowly_and_each_episode_anew():
 
 def test_unknown_scripted_policy():
     with pytest.raises(InvalidInputError) as error:
-        scripted_policy("oracle", CONFIG, None, 0)
+        TASK.scripted_policy("oracle", CONFIG, None, 0)
     assert str(error.value) == "scripted policy 'oracle' is unknown; choose one of raster, nearest-ink, random"

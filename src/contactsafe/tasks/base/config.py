@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.pushes import Pushes
 
 
@@ -28,5 +29,7 @@ class TaskConfig:
 
     def __post_init__(self) -> None:
         """Refuse a time limit that cannot be."""
-        if not isinstance(self.episode_s, int | float) or not 1 / 60 <= self.episode_s <= 86400:
-            raise InvalidInputError(f"episode_s = {self.episode_s!r}; give seconds, from 1/60 to 86400, a day")
+        if not isinstance(self.episode_s, int | float) or not 1 / POLICY_RATE_HZ <= self.episode_s <= 86400:
+            raise InvalidInputError(
+                f"episode_s = {self.episode_s!r}; give seconds, from 1/{POLICY_RATE_HZ} to 86400, a day"
+            )

@@ -7,10 +7,9 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.results.metrics import CONTACT_N
+from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.figures import FIGURES, EpisodeMetric, Episodes, Figure
-
-CONTACT_N = 0.5
-"""Tool force above which the tool counts as in contact, N."""
 
 HELD_OUT_SEED = 1_000_003
 """Added to the seeds of episodes that are never trained on."""
@@ -61,7 +60,7 @@ def evaluate_policy(
     vec_env: VectorEnv,
     episodes: int,
     seed: int,
-    rate_hz: float = 60.0,
+    rate_hz: float = POLICY_RATE_HZ,
     on_episode: Callable[[dict], Any] | None = None,
 ) -> dict[str, Any]:
     """Run a policy over seeded episodes.

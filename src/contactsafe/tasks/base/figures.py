@@ -75,6 +75,11 @@ def largest(name: str) -> Callable[[Episodes], float]:
     return lambda episodes: float(episodes.of(name).max())
 
 
+def total(name: str) -> Callable[[Episodes], int]:
+    """Compute the sum of an entry of the records: in how many episodes something was so."""
+    return lambda episodes: int(np.sum(episodes.of(name)))
+
+
 def count(episodes: Episodes) -> int:
     """Return the number of episodes."""
     return len(episodes.records)

@@ -6,6 +6,7 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.arm import Arm
 from contactsafe.sim.worlds import TICK_S, Worlds
 
 Range = tuple[float, float]
@@ -19,13 +20,13 @@ class Pushes:
         force_n: N, in any direction.
         lasting_s: how long, s.
         pause_s: between the end of one and the start of the next, s.
-        links: which ones are pushed.
+        links: which ones are pushed; None for the third to the last but one.
     """
 
     force_n: Range = (5.0, 25.0)
     lasting_s: Range = (0.3, 1.0)
     pause_s: Range = (0.5, 2.0)
-    links: tuple[int, ...] = (3, 4, 5, 6)
+    links: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         """Refuse pushes that cannot be."""
@@ -33,8 +34,20 @@ class Pushes:
             low, high = getattr(self, name)
             if not 0.0 <= low <= high < np.inf:
                 raise InvalidInputError(f"pushes {name} = ({low}, {high}); give (low, high) with 0 ≤ low ≤ high")
-        if not self.links or not set(self.links) <= set(range(1, 8)):
-            raise InvalidInputError(f"pushes links = {self.links}; give some of 1 to 7")
+        if self.links is not None and not (self.links and all(link >= 1 for link in self.links)):
+            raise InvalidInputError(f"pushes links = {self.links}; give numbers from 1 on, or None for the middle ones")
+
+    def links_of(self, arm: Arm) -> tuple[int, ...]:
+        """Return the links of an arm that are pushed.
+
+        Raises:
+            InvalidInputError: the arm has no such link.
+        """
+        if self.links is None:
+            return tuple(range(3, arm.n)) or (arm.n,)
+        if max(self.links) > arm.n:
+            raise InvalidInputError(f"pushes links = {self.links}; arm '{arm.name}' has {arm.n}, give some of those")
+        return self.links
 
 
 class PushSchedule(Independent):
@@ -52,12 +65,7 @@ class PushSchedule(Independent):
     """
 
     def __init__(self, worlds: Worlds, pushes: Pushes):
-        n = worlds.arm.n
-        if max(pushes.links) > n:
-            raise InvalidInputError(
-                f"pushes links = {pushes.links}; arm '{worlds.arm.name}' has {n}, give some of those"
-            )
-        self._worlds, self._pushes = worlds, pushes
+        self._worlds, self._pushes, self._links = worlds, pushes, pushes.links_of(worlds.arm)
         self.rngs = [np.random.default_rng(0) for _ in range(worlds.n)]
 
     def begin(self, i: int, rng: np.random.Generator) -> None:
@@ -77,4 +85,4 @@ class PushSchedule(Independent):
         force = rng.uniform(*pushes.force_n) * direction / np.linalg.norm(direction)
         start = int(self._worlds.records[i]["tick"]) * TICK_S + rng.uniform(*pushes.pause_s)
         stop = start + rng.uniform(*pushes.lasting_s)
-        self._worlds.push(i, f"link{rng.choice(pushes.links)}", (0.0, 0.0, 0.0), force, start, stop)
+        self._worlds.push(i, f"link{rng.choice(self._links)}", (0.0, 0.0, 0.0), force, start, stop)

@@ -61,6 +61,17 @@ def end_step(metrics: Record, task: Record) -> None:
     task.force_mean, task.force_peak = metrics.tool_force_mean, metrics.tool_force_peak
 
 
+@compiled
+def force_excess(metrics: Record, gentle_n: float) -> float:
+    """Return how far the largest force on the tool passes a gentle one, as a multiple of it, from 0 to 4.
+
+    Args:
+        metrics: `step_metrics_dtype` record.
+        gentle_n: N.
+    """
+    return min(max(metrics.tool_force_peak / gentle_n - 1.0, 0.0), 4.0)
+
+
 @compiled(nogil=True)
 def observe_one(controllers: np.ndarray, tasks: np.ndarray, i: int) -> None:
     """Run `observe_arm` on one of an array of records."""

@@ -12,6 +12,11 @@ Scripted = Mapping[str, Callable[[Any, Any, int], Any]]
 """Scripted policies by name, each made by `make(config, vec_env, seed)`."""
 
 
+def hold_still(observation: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return actions that change nothing, (N, 18)."""
+    return np.zeros((len(observation["target"]), ACTION_SIZE))
+
+
 class RandomPolicy(Independent):
     """Actions sampled uniformly from all that are allowed.
 

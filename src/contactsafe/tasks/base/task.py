@@ -125,6 +125,16 @@ class Task:
         """Return the settings of training that differ from an algorithm's own."""
         return {**self.training_settings.get(algorithm, {}), **(self._paper().training if as_paper else {})}
 
+    def scripted_policy(self, name: str, config: TaskConfig, env: Any, seed: int) -> Any:
+        """Make a scripted policy by name for a vector environment of the task.
+
+        Raises:
+            InvalidInputError: there is none of that name.
+        """
+        if name not in self.scripted:
+            raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(self.scripted)}")
+        return self.scripted[name](config, env, seed)
+
     def _under(self, conditions: Conditions | None, settings: Mapping[str, Any]) -> TaskConfig:
         kind = self.simulation.config_type
         if conditions is None:

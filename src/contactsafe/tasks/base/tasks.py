@@ -14,7 +14,7 @@ from contactsafe.policy.action import act
 from contactsafe.policy.action_config import ACTION_SIZE, action_limits
 from contactsafe.policy.observation import Observation
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.arm import Arm, Pose, require_arm
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
@@ -87,7 +87,7 @@ class Tasks(Independent):
         backend: Callable[..., Backend] | None = None,
     ):
         self.config = self._checked(config)
-        self.arm = arm or self.default_arm()
+        self.arm = self.default_arm() if arm is None else require_arm(arm)
         self._backend = backend
         self._ik = InverseKinematics(self.arm)
         for pose in self.reached():

@@ -82,6 +82,9 @@ class InsertionConfig(TaskConfig):
             raise InvalidInputError(
                 f"error_m = {self.error_m}, tilt_rad = {self.tilt_rad}; give at most 0.02 m and 0.2 rad, none negative"
             )
+        low, high = self.start_m
+        if not 0.0 <= low <= high <= 0.2:
+            raise InvalidInputError(f"start_m = {self.start_m}; give (low, high) with 0 ≤ low ≤ high ≤ 0.2 m")
         low, high = self.friction
         if not 0.0 <= low <= high <= 2.0:
             raise InvalidInputError(f"friction = {self.friction}; give (low, high) with 0 ≤ low ≤ high ≤ 2")

@@ -2,12 +2,18 @@
 
 import math
 
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.arm import Arm
 from contactsafe.robot.description import Inertia, Tip, Tool
 from contactsafe.robot.franka import HAND
 from contactsafe.sim.fixtures import TABLE_HALF_SIZE, Box, Fixture, Vector3
+from contactsafe.tasks.base.tip import tip_of
 
 PEG_RADIUS = 0.01
 """m."""
+
+RADII = (0.002, 0.03)
+"""Least and largest radius of a peg, m: the block has to have room for its hole."""
 
 _PEG_HALF_LENGTH = 0.03
 _PEG_KG = 0.1
@@ -37,13 +43,32 @@ PEG = Tool(
 """The gripper with a steel peg of 20 mm diameter, 60 mm long; the TCP is the middle of its lower face."""
 
 
-def block(mouth: Vector3, clearance_m: float) -> Fixture:
-    """Return a block with a hole in it, its frame at the middle of the hole's mouth, z upwards.
+def peg_radius(arm: Arm, depth_m: float) -> float:
+    """Return the radius of an arm's peg, m.
+
+    Args:
+        arm: that works.
+        depth_m: to which its peg has to go in, m.
+
+    Raises:
+        InvalidInputError: the tip of its tool is no cylinder, or too thin, thick or short a one.
+    """
+    radius, _, half_length = tip_of(arm, "cylinder", "insertion", "contactsafe.tasks.insertion.scene.PEG").half_size
+    if not RADII[0] <= radius <= RADII[1] or 2.0 * half_length < depth_m:
+        raise InvalidInputError(
+            f"arm '{arm.name}' has a peg of radius {radius:g} m, {2.0 * half_length:g} m long; give it a radius of "
+            f"{RADII[0]:g} to {RADII[1]:g} m, and a length of depth_m = {depth_m:g} m or more"
+        )
+    return radius
+
+
+def block(mouth: Vector3, radius: float) -> Fixture:
+    """Return a block with a hole of this radius, m, its frame at the middle of the hole's mouth, z upwards.
 
     The wall is a ring of flat boxes that touch the hole's circle, so that the hole is a polygon about it: at its
     corners it is wider by 0.9 %. Four boxes make the rest of the upper face, one the floor.
     """
-    radius, boxes = PEG_RADIUS + clearance_m, []
+    boxes = []
     width = (radius + 2 * _WALL_HALF) * math.tan(math.pi / _SIDES)
     for k in range(_SIDES):
         angle = 2 * math.pi * k / _SIDES

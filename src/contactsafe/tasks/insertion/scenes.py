@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from contactsafe.policy.action import DOWN
-from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage, level_rectangle
-from contactsafe.robot.arm import Arm, Pose
-from contactsafe.robot.panda import PANDA
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, Pose, description_and_tool
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes
+from contactsafe.tasks.base.scripted import hold_still
 from contactsafe.tasks.insertion.config import InsertionConfig
-from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG, PEG_RADIUS
+from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG
 from contactsafe.tasks.insertion.tasks import InsertionTasks
 
 HOLE = 1
@@ -49,7 +49,7 @@ class InsertionEpisodes(TaskEpisodes):
         """Return the blocks' upper faces with their holes where they truly are, uint8 (n, rows, columns)."""
         away = self.tasks.tasks["mouth"][:, :2] - np.array(self.tasks.config.mouth[:2])
         x, y = (_MIDDLES - away[:, k, None] for k in (0, 1))
-        open_ = x[:, :, None] ** 2 + y[:, None, :] ** 2 < (PEG_RADIUS + self.tasks.config.clearance_m) ** 2
+        open_ = x[:, :, None] ** 2 + y[:, None, :] ** 2 < self.tasks.hole_radius**2
         return np.where(open_, HOLE, 0).astype(np.uint8)
 
 
@@ -58,6 +58,7 @@ class Insertion:
 
     Args:
         config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+        arm: that works; None for a Panda with a peg.
     """
 
     name = "inserting"
@@ -69,34 +70,36 @@ class Insertion:
     )
     highlights: tuple[Highlight, ...] = (Highlight("inserting", "inserted", "Pegs inserted, holes never met before"),)
     panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)
-    stage = Stage(
-        PANDA, PEG, level_rectangle(InsertionConfig.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF)), {HOLE: (20,) * 3}
-    )
 
-    def __init__(self, config: InsertionConfig | None = None):
-        self._config = config or InsertionConfig()
+    def __init__(self, config: InsertionConfig | None = None, arm: Arm | None = None):
+        self._config, self.arm = config or InsertionConfig(), arm or robots.panda(PEG)
+        face = level_rectangle(self._config.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF))
+        self.stage = Stage(*description_and_tool(self.arm), face, {HOLE: (20,) * 3})
 
     def _tasks(
-        self, controller: str, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
+        self, config: InsertionConfig, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
     ) -> InsertionTasks:
-        return InsertionTasks(replace(self._config, controller=controller), len(seeds), list(seeds), worlds)
+        return InsertionTasks(config, len(seeds), list(seeds), worlds, self.arm)
+
+    def _under(self, controller: str) -> InsertionConfig:
+        return replace(self._config, controller=controller)
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> InsertionEpisodes:
         """Return held-out holes."""
-        return InsertionEpisodes(self._tasks(controller, seeds), seeds)
+        return InsertionEpisodes(self._tasks(self._under(controller), seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> InsertionEpisodes:
         """Return holes, and an obstacle that is moved into the forearm while the peg goes in: the arm itself stays."""
-        probe = InsertionTasks()
+        probe = InsertionTasks(arm=self.arm)
         posture = probe.posture_over(Pose(np.array(probe.config.mouth), DOWN))
         obstacle = obstacle_at(probe.arm, posture)
         x, y, z = obstacle.position
         travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
         coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
         worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
-        return InsertionEpisodes(self._tasks(controller, seeds, worlds), seeds)
+        return InsertionEpisodes(self._tasks(self._under(controller), seeds, worlds), seeds)
 
     def scripted(
         self,
@@ -109,9 +112,9 @@ class Insertion:
         """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
         action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
         config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
-        tasks = InsertionTasks(config, len(seeds), list(seeds), worlds)
+        tasks = self._tasks(config, seeds, worlds)
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
-        return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else _nothing
+        return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else hold_still
 
     def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
         """Return whether the peg is in, how deep, and how long that took."""
@@ -122,16 +125,12 @@ class Insertion:
         }
 
 
-def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
-    return np.zeros((len(observation["offset"]), ACTION_SIZE))
-
-
 def straight_in(config: InsertionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
     """Return a script that goes straight down into the hole, to its full depth."""
     down = (_ABOVE_M + config.depth_m) / (POLICY_RATE_HZ * _DOWN_S) / config.action.translation[2]
 
     def act(observation: dict[str, np.ndarray]) -> np.ndarray:
-        actions = _nothing(observation)
+        actions = hold_still(observation)
         actions[:, 2] = np.where(observation["offset"][:, 2] > -config.depth_m, -down, 0.0)
         return actions
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
-from contactsafe.tasks.base.record import end_step, observe_arm
+from contactsafe.sim.worlds import POLICY_RATE_HZ
+from contactsafe.tasks.base.record import end_step, force_excess, observe_arm
 
 REWARD_TERMS = ("approach", "depth", "done", "time", "force", "arm_touched")
 
@@ -29,7 +30,7 @@ BIAS_STEPS = 6
 
 _SMOOTHING = 0.5  # of the wrench, a policy step
 
-parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m", "radius_m")])
+parameters_dtype = np.dtype([(name, _f) for name in (*REWARD_TERMS, "gentle_n", "depth_m")])
 
 
 @compiled
@@ -50,7 +51,7 @@ def observe(controller: Record, task: Record) -> None:
     for k in range(3):
         task.offset[k] = task.pose[k] - task.believed[k]
         task.offset[3 + k] = task.pose[3 + k]
-    task.elapsed[0] = task.steps / 60.0
+    task.elapsed[0] = task.steps / POLICY_RATE_HZ
     measured = controller.measurement.wrench_ee
     for k in range(6):
         if task.steps == 0:
@@ -67,12 +68,11 @@ def score(task: Record, metrics: Record, parameters: Record, position: Vector) -
     away, depth = measure(task, position)
     task.success = 1 if depth >= parameters.depth_m else 0
     task.failed = metrics.arm_touched
-    excess = min(max(metrics.tool_force_peak / parameters.gentle_n - 1.0, 0.0), 4.0)
     task.reward[0] = parameters.approach * (task.away - away)
     task.reward[1] = parameters.depth * (depth - task.depth)
     task.reward[2] = parameters.done * task.success
     task.reward[3] = parameters.time
-    task.reward[4] = parameters.force * excess
+    task.reward[4] = parameters.force * force_excess(metrics, parameters.gentle_n)
     task.reward[5] = parameters.arm_touched * metrics.arm_touched
     task.away, task.depth = away, depth
 

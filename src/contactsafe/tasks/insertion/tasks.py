@@ -1,5 +1,6 @@
 """The insertion task: a round peg, and a hole whose place is known only roughly; force and pose to find it by."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,14 +11,14 @@ from contactsafe.core.rotation import quat_to_matrix, rotvec_to_quat
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.observation import Observation, target_observation
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface
 from contactsafe.tasks.base.tasks import Tasks
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.figures import EPISODE_METRICS, FIGURES
 from contactsafe.tasks.insertion.observation import ELAPSED, OFFSET, WRENCH
-from contactsafe.tasks.insertion.scene import PEG, PEG_RADIUS, block, table
+from contactsafe.tasks.insertion.scene import PEG, block, peg_radius, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
 _STEEL = TipSurface(friction=0.3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
@@ -42,6 +43,7 @@ class InsertionTasks(Tasks):
     episode_metrics = EPISODE_METRICS
     figures = FIGURES
     varies = True
+    place = "mouth"
 
     @property
     def observation_vectors(self) -> tuple[Observation, ...]:
@@ -57,9 +59,20 @@ class InsertionTasks(Tasks):
         """Return a Panda that holds the peg."""
         return robots.panda(PEG)
 
+    def reached(self) -> tuple[Pose, ...]:
+        """Return the corners of where holes may be, above the block and at full depth."""
+        config, error = self.config, self.config.error_m
+        corners = itertools.product((-error, error), (-error, error), (config.start_m[1], -config.depth_m))
+        return tuple(Pose(np.add(config.mouth, corner), DOWN) for corner in corners)
+
+    @property
+    def hole_radius(self) -> float:
+        """Radius of the hole, m: that of the arm's peg, and the clearance."""
+        return peg_radius(self.arm, self.config.depth_m) + self.config.clearance_m
+
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with table and block in it, and a peg of steel."""
-        fixtures = (table(), block(self.config.mouth, self.config.clearance_m))
+        fixtures = (table(), block(self.config.mouth, self.hole_radius))
         return replace(world, fixtures=fixtures, tip=_STEEL)
 
     def prepare(self) -> None:
@@ -68,7 +81,7 @@ class InsertionTasks(Tasks):
         self._parameters = np.zeros(1, dtype=parameters_dtype)
         for name in (*REWARD_TERMS, "gentle_n"):
             self._parameters[name] = getattr(config.reward, name)
-        self._parameters["depth_m"], self._parameters["radius_m"] = config.depth_m, PEG_RADIUS
+        self._parameters["depth_m"] = config.depth_m
 
     def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
         """Draw where the hole truly is and how slippery it is; the tool starts above where it is believed to be."""
@@ -80,8 +93,8 @@ class InsertionTasks(Tasks):
         self.worlds.set_tip_friction(i, rng.uniform(*config.friction))
         task["believed"], task["mouth"] = believed, believed + error
         task["axis"] = -quat_to_matrix(tilt)[:, 2]
-        height = rng.uniform(*config.start_m)
-        return Pose(believed + np.array([0.0, 0.0, options.get("height", height)]), DOWN)
+        height = finite_array(options.get("height", rng.uniform(*config.start_m)), (), "height")
+        return Pose(believed + np.array([0.0, 0.0, float(height)]), DOWN)
 
     def begun(self, i: int, rng: np.random.Generator) -> None:
         """Measure and observe for the first time."""

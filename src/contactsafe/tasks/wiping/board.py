@@ -1,11 +1,13 @@
 """The whiteboard and the camera that looks at it."""
 
+import math
 from dataclasses import dataclass, replace
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface, Vector3, workbench
+from contactsafe.tasks.base.tip import tip_of
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,19 @@ class BoardConfig:
     friction: float = 0.3
     press_n: float = 0.5
 
+    def __post_init__(self) -> None:
+        """Refuse a board that cannot be."""
+        if not 0.0 < self.cell <= self.ink_size <= min(self.size) < math.inf:
+            raise InvalidInputError(
+                f"board size = {self.size}, ink_size = {self.ink_size}, cell = {self.cell}; give a cell greater than "
+                "0 m, an ink_size of at least one cell, and edges of at least ink_size"
+            )
+        if not (0.0 <= self.friction <= 10.0 and 0.0 <= self.press_n < math.inf):
+            raise InvalidInputError(
+                f"board friction = {self.friction}, press_n = {self.press_n}; give a friction of 0 to 10, and a force "
+                "of 0 N or more"
+            )
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -48,6 +63,19 @@ class Camera:
     focal_px: float = 180.0
     size: int = 128
 
+    def __post_init__(self) -> None:
+        """Refuse a camera that sees nothing."""
+        if not (isinstance(self.size, int) and 1 <= self.size <= 4096 and 0.0 < self.focal_px < math.inf):
+            raise InvalidInputError(
+                f"camera size = {self.size!r}, focal_px = {self.focal_px}; give 1 to 4096 whole pixels, and a focal "
+                "length greater than 0"
+            )
+        if not math.dist(self.position[:2], self.target[:2]) > 0.0:
+            raise InvalidInputError(
+                f"camera position = {self.position} is straight above or below its target {self.target}, or no number; "
+                "move it aside: its picture stands upright"
+            )
+
 
 def furnish(world: WorldConfig, board: BoardConfig) -> WorldConfig:
     """Return a world with this board in it and felt for the pad; whatever fixtures it had make room."""
@@ -60,9 +88,4 @@ def pad_half(arm: Arm) -> Vector3:
     Raises:
         InvalidInputError: its tool has no box for a tip.
     """
-    if arm.tool is None or arm.tool.tip is None or arm.tool.tip.shape != "box":
-        raise InvalidInputError(
-            f"arm '{arm.name}' has no pad to wipe with; give it a box for a tip: the tool robots.WIPER, or "
-            "robots.from_mjcf(..., tip=robots.Tip((0.02, 0.02, 0.01)))"
-        )
-    return arm.tool.tip.half_size
+    return tip_of(arm, "box", "wiping", "robots.WIPER").half_size

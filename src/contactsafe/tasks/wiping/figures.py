@@ -1,7 +1,5 @@
 """What the wiping task reports of an episode, and the figures of its evaluation."""
 
-import numpy as np
-
 from contactsafe.tasks.base.figures import (
     FORCES,
     RETURN,
@@ -14,6 +12,7 @@ from contactsafe.tasks.base.figures import (
     median,
     median_time_to_success,
     quantile,
+    total,
 )
 
 
@@ -23,10 +22,6 @@ def _removed(ink_left: float) -> float:
 
 def _cleared_99(episodes: Episodes) -> float:
     return float((episodes.of("ink_removed") >= 0.99).mean())
-
-
-def _arm_contacts(episodes: Episodes) -> int:
-    return int(np.sum(episodes.of("arm_touched")))
 
 
 EPISODE_METRICS = (
@@ -53,7 +48,9 @@ FIGURES = (
     ),
     Figure("time_to_success_median_s", "the same, of the boards wiped clean alone: median", median_time_to_success),
     *FORCES,
-    Figure("arm_contacts", "episodes ended because something other than the pad met board or table", _arm_contacts),
+    Figure(
+        "arm_contacts", "episodes ended because something other than the pad met board or table", total("arm_touched")
+    ),
     Figure(
         "contact_fraction",
         "fraction of all policy steps in which the tool was in contact; the rest goes from patch to patch",

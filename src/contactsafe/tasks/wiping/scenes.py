@@ -8,18 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 from contactsafe.policy.action import DOWN
-from contactsafe.policy.action_config import ACTION_SIZE, ActionConfig
+from contactsafe.policy.action_config import ActionConfig
 from contactsafe.results.figures import Panel
-from contactsafe.results.metrics import Highlight, Metric
-from contactsafe.robot.arm import Arm, Pose
+from contactsafe.results.metrics import Aim, Highlight, Metric
+from contactsafe.results.recording import Stage, level_rectangle
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, Pose, description_and_tool
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
-from contactsafe.tasks.wiping import pictures
+from contactsafe.tasks.base.scripted import hold_still
 from contactsafe.tasks.wiping.camera import render_mask_into
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
+from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
 LURE_CENTRE, LURE_SIZE = (0.5, -0.24), (0.10, 0.06)
 """A dark object on the right of the board, unknown to the policy, which takes it for ink; m."""
@@ -62,33 +65,47 @@ class Wiping:
 
     Args:
         config: of the task, as the policy has learned it; the controllers that are compared stand in for its own.
+        arm: that works; None for a Panda with a wiper.
     """
 
-    name = pictures.NAME
-    policy = pictures.POLICY
-    metrics: tuple[Metric, ...] = pictures.METRICS
-    highlights: tuple[Highlight, ...] = pictures.HIGHLIGHTS
-    panels: tuple[Panel, ...] = pictures.PANELS
-    stage = pictures.STAGE
+    name = "wiping"
+    policy = "A learned policy wipes ink off a whiteboard with a simulated Franka Panda."
+    metrics: tuple[Metric, ...] = (
+        Metric(
+            "ink_removed", "ink removed, mean", "%", 100.0, main=True,
+            aim=Aim(at_least=80.0, ratio_at_least=0.95), mean=True,
+        ),
+        Metric("clean", "boards wiped clean, mean", "%", 100.0, main=True, mean=True),
+        Metric("time_s", "time to a clean board", "s"),
+    )  # fmt: skip
+    highlights: tuple[Highlight, ...] = (Highlight("wiping", "ink_removed", "Ink wiped off boards never seen before"),)
+    panels: tuple[Panel, ...] = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
-    def __init__(self, config: WipingConfig | None = None):
-        self._config = config or WipingConfig()
+    def __init__(self, config: WipingConfig | None = None, arm: Arm | None = None):
+        self._config, self.arm = config or WipingConfig(), arm or robots.panda()
+        board = level_rectangle(self._config.board.centre, self._config.board.size)
+        self.stage = Stage(*description_and_tool(self.arm), board, {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
+
+    def _tasks(
+        self, config: WipingConfig, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
+    ) -> WipingTasks:
+        return WipingTasks(config, len(seeds), list(seeds), worlds, self.arm)
 
     def _under(self, controller: str) -> WipingConfig:
         return replace(self._config, controller=controller)
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
         """Return held-out boards."""
-        return WipingEpisodes(WipingTasks(self._under(controller), len(seeds), list(seeds)), seeds)
+        return WipingEpisodes(self._tasks(self._under(controller), seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> WipingEpisodes:
         """Return boards with a lure on the right, begun on the left, and an obstacle between."""
-        probe, rngs = WipingTasks(WipingConfig()), [held_out(seed) for seed in seeds]
+        probe, rngs = WipingTasks(WipingConfig(), arm=self.arm), [held_out(seed) for seed in seeds]
         obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
         worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
-        tasks = WipingTasks(self._under(controller), len(seeds), list(seeds), worlds)
+        tasks = self._tasks(self._under(controller), seeds, worlds)
         return WipingEpisodes(tasks, seeds, _lured, rngs)
 
     def scripted(
@@ -101,11 +118,11 @@ class Wiping:
     ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return boards and a script: strokes, or nothing just above the board."""
         action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
-        tasks = WipingTasks(WipingConfig(controller=controller, action=action), len(seeds), list(seeds), worlds)
+        tasks = self._tasks(WipingConfig(controller=controller, action=action), seeds, worlds)
         x, y, z = tasks.config.board.centre
         start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
         episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))
-        return episodes, strokes(action) if works else _nothing
+        return episodes, strokes(action) if works else hold_still
 
     def outcome(self, trace: np.ndarray, curves: Mapping[str, np.ndarray], succeeded: bool) -> dict[str, float]:
         """Return how much ink went, whether the board is clean, and how long that took."""
@@ -130,10 +147,6 @@ def _lured(tasks: WipingTasks, i: int, rng: np.random.Generator) -> None:
     tasks.observe(i)
 
 
-def _nothing(observation: dict[str, np.ndarray]) -> np.ndarray:
-    return np.zeros((len(observation["pose"]), ACTION_SIZE))
-
-
 def strokes(action: ActionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarray]:
     """Return a script that presses the pad on the board and strokes sideways from where the tool stands.
 
@@ -144,7 +157,7 @@ def strokes(action: ActionConfig) -> Callable[[dict[str, np.ndarray]], np.ndarra
 
     def act(observation: dict[str, np.ndarray]) -> np.ndarray:
         nonlocal step
-        actions = np.zeros((len(observation["pose"]), ACTION_SIZE))
+        actions = hold_still(observation)
         phase = 2 * math.pi / (POLICY_RATE_HZ * _PERIOD_S)
         actions[:, 1] = _STROKE * (math.sin(phase * (step + 1)) - math.sin(phase * step)) / action.translation[1]
         down = (_ABOVE + _PRESS) / 6  # over the first six steps

@@ -3,12 +3,10 @@
 Each takes the task's observations and returns its actions as a policy does, 60 times a second.
 """
 
-from typing import Any
-
 import numpy as np
 
 from contactsafe.core.copying import Independent
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -50,7 +48,7 @@ class _Script(Independent):
         """Choose the actions, (N, 18), for N observations."""
         pose, target = observation["pose"][:, :3], observation["target"][:, :3]
         force = observation["force"][:, 2]
-        actions = np.zeros((len(pose), 18), np.float32)
+        actions = np.zeros((len(pose), ACTION_SIZE), np.float32)
         for i in range(len(pose)):
             goal, lower = self._goal(i, observation)
             step = goal - (pose[i, :2] + target[i, :2])
@@ -126,14 +124,3 @@ SCRIPTED: Scripted = {
     **RANDOM,
 }
 """Scripted policies by name, made for a vector environment of the task."""
-
-
-def scripted_policy(name: str, config: WipingConfig, env: Any, seed: int) -> Any:
-    """Make a scripted policy by name for a vector environment of the task.
-
-    Raises:
-        InvalidInputError: there is none of that name.
-    """
-    if name not in SCRIPTED:
-        raise InvalidInputError(f"scripted policy '{name}' is unknown; choose one of {', '.join(SCRIPTED)}")
-    return SCRIPTED[name](config, env, seed)

@@ -1,10 +1,10 @@
-"""One policy step of many wiping tasks, compiled: action, ticks, mask, reward. Runs without the GIL."""
+"""What is erased, scored and observed after every policy step, compiled. Runs without the GIL."""
 
 import numpy as np
 
 from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
-from contactsafe.tasks.base.record import end_step, observe_arm
+from contactsafe.tasks.base.record import end_step, force_excess, observe_arm
 from contactsafe.tasks.wiping.camera import CameraTables, camera_at, render_mask_into
 from contactsafe.tasks.wiping.ink import InkIndex, nearest_ink, remove_erased
 from contactsafe.tasks.wiping.whiteboards import erase
@@ -39,7 +39,6 @@ def score(task: Record, metrics: Record, rewards: Record, ink: int, distance: fl
     task.success = 1 if ink <= rewards.clean_fraction * task.ink_start else 0
     task.failed = metrics.arm_touched
     touching = metrics.contact_ticks > 0 and metrics.tool_force_peak < rewards.force_limit_n
-    excess = min(max(metrics.tool_force_peak / rewards.gentle_n - 1.0, 0.0), 4.0)
     task.reward[0] = rewards.ink * wiped / max(task.ink_start, 1)
     task.reward[1] = rewards.done * task.success
     task.reward[2] = rewards.approach * (task.distance - distance) if wiped == 0 else 0.0
@@ -47,7 +46,7 @@ def score(task: Record, metrics: Record, rewards: Record, ink: int, distance: fl
         task.reward[2] += rewards.nearness * max(1.0 - distance / rewards.nearness_m, 0.0)
     task.reward[3] = rewards.contact if touching else 0.0
     task.reward[4] = rewards.time
-    task.reward[5] = rewards.force * excess
+    task.reward[5] = rewards.force * force_excess(metrics, rewards.gentle_n)
     task.reward[6] = rewards.arm_table * metrics.arm_touched
     task.ink, task.distance = ink, distance
 
