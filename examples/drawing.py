@@ -8,16 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from contactsafe.report import COLOURS, View
-from contactsafe.robot import ArmDescription, Tool, arm_capsules, tip_box
+from contactsafe.report import COLOURS, View, visible_faces
+from contactsafe.robot import ArmDescription, Tool, arm_capsules, tip_corners
 
 COLOUR = {name: on_light for name, (on_light, _) in COLOURS.items()}
 """Of the controllers, as in the report."""
 
 INK, SOFT, ARM, BLOCK, OBSTACLE, BAND = "#1c2126", "#5a646e", "#dfe4e9", "#3f5f8f", "#e3a13c", "#eef1f4"
-
-_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_FACES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
 
 _STYLE = {
     "font.size": 10, "axes.spines.top": False,
@@ -67,11 +64,9 @@ def draw_arm(axis: Axes, arm: ArmDescription, tool: Tool, q: np.ndarray, view: V
     starts, ends = ((x[0] - view.target) @ view.axes().T for x in (starts, ends))
     middles = (starts[:, 2] + ends[:, 2]) / 2
     parts = [(middles[k], _stadium(starts[k, :2], ends[k, :2], radii[k]), ARM) for k in range(len(radii))]
-    if tool.tip is not None and tool.tip.shape == "box":
-        centre, half, rotation = tip_box(arm, tool, q[None])
-        corners = (centre[0] + (_CORNERS * half) @ rotation[0].T - view.target) @ view.axes().T
-        nearest = sorted(_FACES, key=lambda face: corners[face, 2].mean())[3:]
-        parts += [(corners[:, 2].mean() + 1e-6 * k, corners[face, :2], BLOCK) for k, face in enumerate(nearest)]
+    if tool.tip is not None:
+        tip = (tip_corners(arm, tool, q[None])[0] - view.target) @ view.axes().T
+        parts += [(tip[..., 2].mean() + 1e-6 * k, face, BLOCK) for k, face in enumerate(visible_faces(tip))]
     for _, outline, colour in sorted(parts, key=lambda part: part[0]):
         axis.add_patch(Polygon(outline, facecolor=colour, edgecolor=edge, linewidth=0.9, alpha=opacity))
     width, height = view.span

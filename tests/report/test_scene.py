@@ -10,11 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
+from scipy.spatial import ConvexHull
 
-from contactsafe.report.scene import View, fit, picture
+from contactsafe.report.scene import View, fit, picture, visible_faces
 from contactsafe.report.strip import moments, strips
 from contactsafe.results.experiment import Experiment, Trial
-from contactsafe.robot.shape import arm_capsules
+from contactsafe.robot.franka import WIPER
+from contactsafe.robot.shape import arm_capsules, tip_rings
+from contactsafe.tasks.insertion.scene import PEG
 
 angles = st.floats(-3.0, 3.0)
 
@@ -98,3 +101,17 @@ def test_a_strip_has_a_row_a_controller_and_a_force_a_picture(stage, runs):
     shown = strips(Experiment("x", "X", "?", trials, recordings=tuple(runs)), stage)
     assert shown.count("<svg") == shown.count(" N</td>") == len(runs) * len(moments(runs))
     assert shown.index(">vices<") < shown.index(">safe<")
+
+
+@given(st.sampled_from([WIPER, PEG]), angles, st.floats(-1.5, 1.5))
+def test_the_visible_faces_of_a_tip_cover_its_outline_once(tool, azimuth, elevation):
+    seen = tip_rings(tool) @ View((0.0, 0.0, 0.0), (1.0, 1.0), azimuth, elevation).axes().T
+    outline = ConvexHull(seen[..., :2].reshape(-1, 2)).volume
+    faces = visible_faces(seen)
+    assert sum(polygon_area(face) for face in faces) == pytest.approx(outline)
+    assert len(faces) <= (3 if tool is WIPER else 2)
+
+
+def polygon_area(outline):
+    x, y = outline.T
+    return 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)

@@ -1,14 +1,19 @@
 """Capsules and tip lie where MuJoCo puts the geoms of the generated model."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.description import Tip
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.shape import arm_capsules, tip_box
+from contactsafe.robot.shape import arm_capsules, tip_corners
+
+PEG = replace(HAND, name="hand with peg", tcp=(0.0, 0.0, 0.15), tip=Tip((0.01, 0.01, 0.03), "cylinder"))
 
 
 @pytest.fixture(scope="module")
@@ -36,16 +41,23 @@ def test_capsules_are_mujocos(postures, tool):
         np.testing.assert_allclose(length, sign * axis, atol=1e-9)
 
 
-def test_tip_is_mujocos(postures):
-    model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, WIPER))
+@pytest.mark.parametrize("tool", [WIPER, PEG], ids=["box", "cylinder"])
+def test_tip_is_mujocos(postures, tool):
+    model = mujoco.MjModel.from_xml_string(arm_mjcf(PANDA, tool))
     data = mujoco.MjData(model)
-    centre, half, rotation = tip_box(PANDA, WIPER, postures)
-    np.testing.assert_allclose(half, model.geom("tip").size)
+    corners = tip_corners(PANDA, tool, postures)
     for i, q in enumerate(postures):
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
-        np.testing.assert_allclose(centre[i], data.geom("tip").xpos, atol=1e-9)
-        np.testing.assert_allclose(rotation[i], data.geom("tip").xmat.reshape(3, 3), atol=1e-9)
+        geom = data.geom("tip")
+        local = (corners[i] - geom.xpos) @ geom.xmat.reshape(3, 3)
+        np.testing.assert_allclose(local.mean(axis=(0, 1)), 0.0, atol=1e-9)
+        np.testing.assert_allclose(local[..., 2], np.outer([1, -1], np.full(local.shape[1], tool.tip.half_size[2])))
+        across = np.abs(local[..., :2])
+        if tool.tip.shape == "box":
+            np.testing.assert_allclose(across, np.broadcast_to(tool.tip.half_size[:2], across.shape))
+        else:
+            np.testing.assert_allclose(np.linalg.norm(across, axis=-1), tool.tip.half_size[0])
 
 
 def test_wrong_shape_is_refused():
@@ -53,6 +65,6 @@ def test_wrong_shape_is_refused():
         arm_capsules(PANDA, WIPER, np.zeros(7))
 
 
-def test_tool_without_a_box_for_a_tip_is_refused():
-    with pytest.raises(InvalidInputError, match="tool 'franka hand' has no box for a tip"):
-        tip_box(PANDA, HAND, np.zeros((1, 7)))
+def test_tool_without_a_tip_is_refused():
+    with pytest.raises(InvalidInputError, match="tool 'franka hand' has no tip"):
+        tip_corners(PANDA, HAND, np.zeros((1, 7)))

@@ -208,17 +208,12 @@
           line([p[0], p[1] - 0.28 * r], [q[0], q[1] - 0.28 * r], r, style.shine);
         }];
       });
-      const block = this.film.arm.block;
-      if (block) {
-        const box = [];
-        for (const i of [-1, 1]) for (const j of [-1, 1]) for (const k of [-1, 1])
-          box.push(project(place(frames.length - 1, add(block.centre, [i * block.half[0], j * block.half[1], k * block.half[2]]))));
-        const faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
-          .map((face) => face.map((i) => box[i])).sort((a, b) => depth(a) - depth(b)).slice(3);
-        things.push([depth(box), () => {
+      if (this.film.arm.tip) {
+        const tip = this.film.arm.tip.map((ring) => ring.map((corner) => project(place(frames.length - 1, corner))));
+        things.push([depth(tip.flat()), () => {
           c.lineWidth = 1;
           c.strokeStyle = style.edge;
-          faces.forEach((face) => outline(face, style.block));
+          visibleFaces(tip).forEach((face) => outline(face, style.block));
         }]);
       }
       if (this.run.obstacle) {
@@ -281,6 +276,22 @@
   }
 
   const depth = (points) => points.reduce((sum, p) => sum + p[2], 0) / points.length;
+  const area = (points) => points.reduce((sum, [x, y], i) => {
+    const [u, v] = points[(i + 1) % points.length];
+    return sum + y * u - x * v; // y goes down: positive where the outline runs counter-clockwise
+  }, 0);
+
+  // The faces of a tip that are seen, its corners given about the face at the TCP and the opposite one, in one order;
+  // where it is round all its sides together are one.
+  function visibleFaces([front, back]) {
+    const n = front.length, next = (k) => (k + 1) % n;
+    const sides = front.map((_, k) => [back[k], back[next(k)], front[next(k)], front[k]]);
+    const ends = [front, [...back].reverse()].filter((face) => area(face) > 0);
+    const seen = sides.map((side) => area(side) > 0), first = seen.findIndex((is, k) => is && !seen[(k + n - 1) % n]);
+    if (n === 4 || first < 0) return [...sides.filter((_, k) => seen[k]), ...ends];
+    const run = Array.from({ length: seen.filter(Boolean).length + 1 }, (_, k) => (first + k) % n);
+    return [[...run.map((k) => back[k]), ...run.reverse().map((k) => front[k])], ...ends];
+  }
 
   function readStyle(film, names) {
     const css = getComputedStyle(film);

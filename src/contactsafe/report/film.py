@@ -15,6 +15,7 @@ from contactsafe.results.experiment import Experiment
 from contactsafe.results.metrics import CONTACT_N
 from contactsafe.results.recording import Recording, Stage
 from contactsafe.robot.description import Capsule, Quaternion, Vector3
+from contactsafe.robot.shape import tip_rings
 
 FRAMES_HZ = 60
 """Frames of the film a second: those of a screen."""
@@ -144,11 +145,8 @@ def _arm(stage: Stage) -> dict:
         for owner, group in enumerate(groups)
         for capsule in group
     ]
-    block = None
-    if tool.tip is not None:
-        x, y, z = tool.tcp
-        block = {"centre": (x, y, z - tool.tip.half_size[2]), "half": tool.tip.half_size}
-    return {"frames": frames, "capsules": capsules, "block": block}
+    tip = None if tool.tip is None else _rounded(tip_rings(tool))
+    return {"frames": frames, "capsules": capsules, "tip": tip}
 
 
 def _frame(position: Vector3, quat: Quaternion) -> dict:

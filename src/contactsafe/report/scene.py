@@ -9,11 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.results.recording import Colour, Recording, Stage
-from contactsafe.robot.shape import arm_capsules, tip_box
+from contactsafe.robot.shape import arm_capsules, tip_corners
 
 _AZIMUTH, _ELEVATION = math.radians(22.0), math.radians(22.0)
-_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 
 
 @dataclass(frozen=True)
@@ -97,9 +95,8 @@ def picture(stage: Stage, view: View, recording: Recording, tick: int, width: in
     projected = [view.project(x[0], width, height) for x in (starts, ends)]
     things = [((a[2] + b[2]) / 2, _capsule(a, b, scale * r)) for a, b, r in zip(*projected, radii, strict=True)]
     if stage.tool.tip is not None:
-        centre, half, rotation = tip_box(stage.arm, stage.tool, q)
-        box = view.project(centre[0] + (_CORNERS * half) @ rotation[0].T, width, height)
-        things.append((box[:, 2].mean(), _box(box)))
+        tip = view.project(tip_corners(stage.arm, stage.tool, q)[0], width, height)
+        things.append((tip[..., 2].mean(), _tip(tip)))
     if recording.obstacle is not None:
         places = recording.trace["obstacle_position"][:, 0]
         rest, now = view.project(places[0], width, height), view.project(places[tick], width, height)
@@ -147,9 +144,37 @@ def _capsule(a: np.ndarray, b: np.ndarray, radius: float) -> str:
     )
 
 
-def _box(corners: np.ndarray) -> str:
-    nearest = sorted(_FACES, key=lambda face: corners[list(face), 2].mean())[3:]
-    return "".join(f'<polygon class="block" points="{_points(corners[list(face)])}"/>' for face in nearest)
+def visible_faces(tip: np.ndarray) -> list[np.ndarray]:
+    """Return the faces of a tool's tip that are seen; where it is round all its sides together are one.
+
+    Args:
+        tip: corners as `contactsafe.robot.tip_corners` orders them, in a picture: x right, y up, (2, K, 2 or more).
+
+    Returns:
+        Outlines, (P, 2) each.
+    """
+    front, back = tip[0, :, :2], tip[1, :, :2]
+    after = np.roll(np.arange(len(front)), -1)
+    sides = [np.array([back[k], back[j], front[j], front[k]]) for k, j in enumerate(after)]
+    ends = [face for face in (front, back[::-1]) if _area(face) > 0.0]
+    seen = np.array([_area(side) > 0.0 for side in sides])
+    if len(front) == 4 or seen.all() or not seen.any():
+        return [*(side for side, is_seen in zip(sides, seen, strict=True) if is_seen), *ends]
+    first = int(np.flatnonzero(seen & ~np.roll(seen, 1))[0])
+    run = (first + np.arange(seen.sum() + 1)) % len(front)
+    return [np.concatenate([back[run], front[run[::-1]]]), *ends]
+
+
+def _area(outline: np.ndarray) -> float:
+    """Return twice the area within an outline, positive where it runs counter-clockwise."""
+    x, y = outline.T
+    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _tip(tip: np.ndarray) -> str:
+    upwards = np.array([1.0, -1.0])
+    faces = visible_faces(tip[..., :2] * upwards)
+    return "".join(f'<polygon class="block" points="{_points(face * upwards)}"/>' for face in faces)
 
 
 def _obstacle(centre: np.ndarray, shape: tuple[float, float], scale: float, view: View, name: str) -> str:

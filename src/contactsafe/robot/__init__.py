@@ -3,7 +3,7 @@
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.description import ArmDescription, Tip, Tool
 from contactsafe.robot.payload import Payload, carrying
-from contactsafe.robot.shape import arm_capsules, link_frames, tip_box
+from contactsafe.robot.shape import arm_capsules, link_frames, tip_corners
 
 __all__ = [
     "Arm",
@@ -15,5 +15,5 @@ __all__ = [
     "arm_capsules",
     "carrying",
     "link_frames",
-    "tip_box",
+    "tip_corners",
 ]

@@ -7,6 +7,8 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.description import ArmDescription, Tool
 
+_ROUND = 24  # corners of a cylinder's outline
+
 
 def link_frames(description: ArmDescription, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Return the frames of base, links and tool mount in world axes, base at the origin.
@@ -62,26 +64,46 @@ def arm_capsules(
     return placed[:, :, 0], placed[:, :, 1], radii, links
 
 
-def tip_box(description: ArmDescription, tool: Tool, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place the tool's tip in the world.
+def tip_rings(tool: Tool) -> np.ndarray:
+    """Return the corners of a tool's tip, about the face at its TCP and about the opposite one, in the mount's frame.
+
+    Args:
+        tool: with a tip.
+
+    Returns:
+        (2, K, 3), m, both in the order that is counter-clockwise for who faces the TCP: K is 4 for a box, 24 for a
+        cylinder.
+
+    Raises:
+        InvalidInputError: the tool has no tip.
+    """
+    if tool.tip is None:
+        raise InvalidInputError(f"tool '{tool.name}' has no tip; give one that has, such as robots.WIPER")
+    corners = 4 if tool.tip.shape == "box" else _ROUND
+    angles = 2.0 * np.pi * (np.arange(corners) + 0.5) / corners
+    reach = np.sqrt(2.0) if corners == 4 else 1.0
+    half = np.array(tool.tip.half_size)
+    ring = reach * half * np.stack([np.cos(angles), np.sin(angles), np.zeros(corners)], axis=1)
+    return np.array(tool.tcp) + np.stack([ring, ring - (0.0, 0.0, 2.0 * half[2])])
+
+
+def tip_corners(description: ArmDescription, tool: Tool, q: ArrayLike) -> np.ndarray:
+    """Place the corners of the tool's tip in the world.
 
     Args:
         description: the arm, of n joints.
-        tool: what the flange carries, with a box for a tip.
+        tool: what the flange carries, with a tip.
         q: joint positions, (F, n), rad.
 
     Returns:
-        Centre, (F, 3), m; half edges, (3,), m; rotation, (F, 3, 3).
+        (F, 2, K, 3), m, in the order of `tip_rings`.
 
     Raises:
-        InvalidInputError: the tool's tip is no box, or q has another shape.
+        InvalidInputError: the tool has no tip, or q has another shape.
     """
-    if tool.tip is None or tool.tip.shape != "box":
-        raise InvalidInputError(f"tool '{tool.name}' has no box for a tip; give one that has, such as robots.WIPER")
+    rings = tip_rings(tool)
     origins, rotations = link_frames(description, q)
-    half = np.array(tool.tip.half_size)
-    centre = np.array(tool.tcp) - (0.0, 0.0, half[2])
-    return origins[:, -1] + rotations[:, -1] @ centre, half, rotations[:, -1]
+    return origins[:, -1, None, None] + rings @ rotations[:, -1, None].swapaxes(-1, -2)
 
 
 def _attach(origins: np.ndarray, rotations: np.ndarray, index: int, position, quat) -> None:

@@ -11,13 +11,13 @@ from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.insertion.config import InsertionConfig
 
-PRESS_N = 6.0
+PRESS_N = 4.0
 """Force with which the spiral presses, N."""
 
-_PITCH_M = 0.0009  # between turns of the spiral: a tip within half of it falls in
-_SPEED_M_S = 0.025  # along the spiral
-_BEHIND_M = 0.001  # the spiral waits for a tool that friction keeps further behind
-_CATCH_UP = 0.15  # of the distance to the next point, that x_d moves each step: friction keeps the tool behind
+_PITCH_M = 0.001  # between turns of the spiral: a tip within half of it falls in
+_SPEED_M_S = 0.045  # along the spiral
+_BEHIND_M = 0.0015  # the spiral waits for a tool that friction keeps further behind
+_CATCH_UP = 0.3  # of the distance to the next point, that x_d moves each step: friction keeps the tool behind
 _DESCENT_M_S = 0.012
 _TOUCH_N = 2.0
 _INSIDE_M = 0.0008  # below the believed mouth: the tip is in
