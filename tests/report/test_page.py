@@ -209,6 +209,16 @@ def test_names_are_escaped(fakes, tmp_path):
     assert parsed.figures == {"<odd>/<b>&/vices/depth_mm": "1.5", "<odd>/<b>&/<i>x/depth_mm": None}
 
 
+def test_figures_outlive_a_page_that_cannot_be_drawn(fakes, tmp_path, monkeypatch):
+    def fail(*_):
+        raise ValueError("no such shape")
+
+    monkeypatch.setattr("contactsafe.report.page.render", fail)
+    with pytest.raises(ValueError, match="no such shape"):
+        write_report(tmp_path, [fakes.task_safety()], {})
+    assert {path.name for path in tmp_path.iterdir()} == {"summary.json", "task-safety.csv"}
+
+
 def test_one_controller_and_no_recordings(fakes, tmp_path):
     experiment = fakes.task_safety()
     alone = tuple(trial for trial in experiment.trials if trial.controller == "safe")

@@ -55,8 +55,8 @@ def demo(
     started = time.monotonic()
     results = _run(registry.PAPER, config)
     info = _run_info("contactsafe demo", task, config, time.monotonic() - started)
-    page = write_report(folder, results, info)
     print(terminal_table(results))
+    page = write_report(folder, results, info)
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
 
 

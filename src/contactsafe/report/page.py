@@ -14,7 +14,7 @@ from contactsafe.results.experiment import Experiment
 
 
 def write_report(folder: str | Path, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
-    """Write `report.html`, `summary.json` and every experiment's trials as CSV.
+    """Write `summary.json`, every experiment's trials as CSV, and last `report.html`: figures outlive a page that fails.
 
     Args:
         folder: where to.
@@ -28,11 +28,10 @@ def write_report(folder: str | Path, experiments: Sequence[Experiment], info: Ru
         OutputError: the folder cannot be written; no half-written file is left behind.
     """
     folder = prepare_output(folder)
-    page = render(experiments, info)
     write_summary(folder, experiments, info)
     for experiment in experiments:
         write_whole(folder / f"{experiment.name}.csv", trials_csv(experiment))
-    return write_whole(folder / "report.html", page)
+    return write_whole(folder / "report.html", render(experiments, info))
 
 
 def render(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> str:
