@@ -14,7 +14,7 @@ from contactsafe.results.experiment import Experiment
 
 
 def write_report(folder: str | Path, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
-    """Write `summary.json`, every experiment's trials as CSV, and last `report.html`: figures outlive a page that fails.
+    """Write `summary.json`, every experiment's trials as CSV, and last, as drawing it may fail, `report.html`.
 
     Args:
         folder: where to.
