@@ -23,7 +23,7 @@ def braking_fraction(qd: Vector, speed: Vector, c: Vector, speed_max: Vector, ta
     where the arm's motion by itself asks a motor for half of its torque.
 
     Args:
-        qd, speed: now, and by then, (n,), rad/s; see `limits.predict_velocity`.
+        qd, speed: now, and by then, (n,), rad/s; see `joint_stops.predict_velocity`.
         c: Coriolis and centrifugal torque, (n,), N m; grows with the square of speed.
         speed_max: (n,), rad/s.
         tau_max: (n,), N m.

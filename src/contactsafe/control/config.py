@@ -122,8 +122,8 @@ class ReactionConfig(Stage):
     )
     contact_force_limit_reject_n: float = parameter(_INF, "N", "the same in mode REJECT", infinite=True)
     contact_force_limit_initial_n: float = parameter(
-        20.0, "N", "the bound when a contact begins; it falls to `contact_force_limit_comply_n` within a few "
-        "`contact_force_limit_decay_s`",
+        20.0, "N", "the bound when a contact begins; it falls exponentially, and from "
+        "`contact_force_limit_comply_n` on that one is in force",
     )  # fmt: skip
     contact_force_limit_decay_s: float = parameter(0.15, "s", "time constant with which it falls", positive=True)
     tool_force_limit_n: float = parameter(

@@ -11,7 +11,7 @@ _f = np.float64
 _i = np.int64
 
 _SIGMAS = 3.0
-"""A contact is what exceeds this many standard deviations of the weight that is not known yet."""
+"""Standard deviations of the unidentified weight that a threshold allows for."""
 
 
 def detection_dtype(n: int) -> np.dtype:
@@ -37,10 +37,11 @@ def set_thresholds(
     params: Record,
     friction_coefficients: Matrix,
 ) -> None:
-    """Set each joint's threshold to what is not known of the arm.
+    """Set each joint's threshold: δ plus what may be wrong with the model of the arm.
 
-    δ plus a fraction of friction and of inertial torque, whose model is not exact, plus what a late command is short
-    of, what the tool may have felt unseen, and the standard deviation of the gravity torque that is not identified.
+    Added are fractions of the friction and of the inertial torque; how far a command may have changed since the motors
+    took it over; the change of the tool's wrench since it was measured last; and a multiple of the standard deviation
+    of the gravity torque that is not identified yet.
 
     Args:
         detection: `detection_dtype` record; its thresholds are set.

@@ -23,8 +23,8 @@ def stops_dtype(n: int) -> np.dtype:
     """Describe what the joint stops do in a tick."""
     return np.dtype(
         [
-            ("speed", _f, (n,)),  # before the torque that drives the joint can be taken off, rad/s
-            ("horizon", _f, (n,)),  # until then, s
+            ("speed", _f, (n,)),  # that a joint will have reached when the torque that drives it is off, rad/s
+            ("horizon", _f, (n,)),  # time until that torque is off, s
             ("excess", _f, (n,)),  # of speed, positive where it moves up, rad/s
             ("intrusion", _f, (n,)),  # into the margin, positive at the upper end, rad
             ("brake", _f, (n,)),  # per excess of speed, N m s/rad
@@ -94,8 +94,9 @@ def joint_stop_gains(
 ) -> None:
     """Fill what the joint stops may brake and push back with, kept within what those joints take (`control.damping`).
 
-    The brake is in proportion to the inertia that the joint moves; the spring no more than lets damping make up twice
-    for its delay; the drag is that damping, where the brake does not act. Joints without excess and intrusion get none.
+    The brake is in proportion to the inertia that the joint moves. A spring behind a delay feeds energy into the joint:
+    it is kept so soft that half of the damping there is takes that energy out again. The drag is this damping, for
+    joints that are not braked. Joints without excess and intrusion get none.
 
     Args:
         stops: `stops_dtype` record; `brake`, `spring` and `drag` are filled.

@@ -49,9 +49,9 @@ def limits_dtype(n: int) -> np.dtype:
 def limit_command(c: Record, tau: Vector) -> tuple[int, bool]:
     """Keep a command within all limits, in place; return what took something off it, a sum of keys of LIMITS.
 
-    Joints are stopped from what the motors can do, not from what is wanted of them: torque is limited first, and last
-    once more, with its rate. Motors carry c and g as well, joint stops do without, and the energy tank pays for c: they
-    are added and taken off here and nowhere else.
+    Joint stops are reckoned from what the motors can do, not from what is asked of them: so torque is limited first,
+    and at the end once more, with its rate. The torque limits count c and g, the joint stops neither, the energy tank c
+    alone: here, and nowhere else, they are added and taken off.
 
     Args:
         c: `controller_dtype` record; its `limits` and `command` are advanced.

@@ -36,7 +36,7 @@ def link_masses_dtype(n: int) -> np.dtype:
             ("mass_error", _f, (n + 1,)),  # relative, of the links and of the tool
             ("covariance", _f, (n + 1, n + 1)),
             ("gravity_sigma", _f, (n,)),  # standard deviation of the gravity torque, N m
-            ("gravity_correction", _f, (n,)),  # gravity torque beyond the model's, N m; the command does without it
+            ("gravity_correction", _f, (n,)),  # of `dynamics.g`, N m; the laws take it off the command
             ("ticks", _i),  # since the start
         ]
     )
@@ -63,8 +63,8 @@ def reset_link_masses(masses: Record, variance: Vector) -> None:
 def correct_gravity(masses: Record, dynamics: Record, handle: Record, has_wrench: int, variance: Vector) -> None:
     """Add what the links were found to be heavier than the model says to the model's gravity torque.
 
-    That is for the observer and the bounds. The command does without, see `gravity_correction`: in free motion the arm
-    moves as it would without all this, and nothing that was identified wrongly from a light touch moves it.
+    The corrected gravity is for the observer and the bounds. The laws take the correction off the command again: a mass
+    that was identified wrongly, from a light touch, does not move the arm.
 
     Args:
         masses: `link_masses_dtype` record; its correction is set.

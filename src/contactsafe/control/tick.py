@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from contactsafe.control import reaction
+from contactsafe.control import contact_bound, reaction
 from contactsafe.control.classification import contact_kind
 from contactsafe.control.clock import receive, set_step
 from contactsafe.control.codes import (
@@ -186,7 +186,7 @@ def _has_unknown_load(c: Record) -> bool:
 def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     """Free law (17) or contact-aware law (18), (21), (22), with bounded contact force; without c and g, (n,), N m."""
     state, dynamics, params, target = c.state, c.dynamics, c.params, c.state.target
-    arm, impedance, react, tool = state.arm, state.impedance, state.reaction, state.tool_wrench
+    arm, impedance, tool = state.arm, state.impedance, state.tool_wrench
     n = arm.q.shape[0]
     follow_gains(impedance, target, state.step.dt, params.impedance)
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
@@ -195,21 +195,21 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     set_joint_damping(impedance, state.mode, dynamics.M_inv, params)
     N_t = task_nullspace(dynamics.J, J_bar)
     N_ct = N_t if state.mode == FREE else contact_nullspace(N_t, dynamics.M_inv, state.isolation.direction)
-    reaction.follow_posture_scale(react, state.mode, state.step.recover_gain, params.reaction)
+    reaction.follow_posture_scale(state.reaction, state.mode, state.step.recover_gain, params.reaction)
     elastic_posture, damping_posture = stack_vector(n), stack_vector(n)
     posture_torques_into(
-        impedance, arm, target.q_posture, react.posture_scale, params, elastic_posture, damping_posture
+        impedance, arm, target.q_posture, state.reaction.posture_scale, params, elastic_posture, damping_posture
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
     follow_tool_force(tool, arm, state.observer.residual_fast, J_bar, state.step.probe_gain)
-    scale, reason = reaction.tool_task_scale(
+    scale, reason = contact_bound.tool_task_scale(
         F_spring, tool.force, params.classification.tool_contact_n, params.reaction.tool_force_limit_n
     )
     if state.mode == FREE:
         c.output.contact_command_nm, c.output.contact_limit_nm = 0.0, math.inf
-        reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
-        return react.task_scale * elastic + damping - state.link_masses.gravity_correction
+        contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)
+        return state.reaction.task_scale * elastic + damping - state.link_masses.gravity_correction
     compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
     return _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
 
@@ -229,18 +229,18 @@ def _contact_law(
     Returns:
         Command less c and g, (n,), N m.
     """
-    state, params, react, impedance = c.state, c.params.reaction, c.state.reaction, c.state.impedance
+    state, params, impedance = c.state, c.params.reaction, c.state.impedance
     qd, direction, M_inv = state.arm.qd, state.isolation.direction, c.dynamics.M_inv
-    limit = reaction.contact_limit(react, state.isolation, params)
+    limit = contact_bound.contact_limit(state.reaction, state.isolation, params)
     reaction.damp_contact(damping, N_removed, qd, impedance.damping_scale, params)
-    compensated = reaction.bound_compensation(compensation, direction, M_inv, limit)
+    compensated = contact_bound.bound_compensation(compensation, direction, M_inv, limit)
     left = limit - max(min(compensated, limit), 0.0)
     asked = torque_against_contact(direction, M_inv, elastic)
-    scale, reason = reaction.scale_of_task(asked, left, scale, reason)
-    reaction.follow_task_scale(react, state.mode, scale, reason, state.step)
-    tau = react.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
+    scale, reason = contact_bound.scale_of_task(asked, left, scale, reason)
+    contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)
+    tau = state.reaction.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
     c.output.contact_command_nm, c.output.contact_limit_nm = compensated + asked, limit
-    reaction.remove_excess(tau, direction, M_inv, limit)
+    contact_bound.remove_excess(tau, direction, M_inv, limit)
     if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
         rate = c.params.limits.braking_rate - impedance.task_damping
@@ -254,7 +254,7 @@ def _send(c: Record, tau: Vector) -> None:
     state, dynamics, out = c.state, c.dynamics, c.output
     scaled = state.reaction.task_scale
     limited_by = state.reaction.scale_reason if scaled < 1.0 else 0
-    if state.payload.is_load != 0 and scaled < reaction.WHOLE:
+    if state.payload.is_load != 0 and scaled < contact_bound.WHOLE:
         limited_by |= LIMITED_BY_LOAD
     met, finite = limit_command(c, tau)
     if not finite:

@@ -28,8 +28,8 @@ class PpoConfig(PolicyConfig):
         max_grad_norm: gradients are clipped to this.
         target_kl: an update stops early when the policy moved further than this.
         log_std_init: log of the first standard deviation of each action.
-        log_std_final: of the last; between them it falls linearly: the mean alone, which is what is shipped, stands
-            still before what exploration only gets at by accident.
+        log_std_final: of the last; between them it falls linearly. The bundle acts by the mean alone, so the mean must
+            learn to do without noise.
     """
 
     algorithm: ClassVar[str] = "ppo"

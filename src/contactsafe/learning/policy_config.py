@@ -60,7 +60,7 @@ class PolicyConfig:
         rollout_steps: steps of each environment between two checkpoints and points of the curves; on-policy algorithms
             update the policy just as often.
         batch: samples in a gradient step.
-        learning_rate: of Adam; falls linearly to a twentieth over total_steps.
+        learning_rate: of Adam; falls linearly over total_steps, and stays at a twentieth.
         discount: the paper's γ of RL, for one environment step; raised to action_repeat.
         net: widths of the hidden layers, of policy and of value network.
         action_repeat: environment steps for which one action is given.

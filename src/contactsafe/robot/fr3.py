@@ -1,7 +1,7 @@
 """Franka Research 3, from published figures; frames, shape and tools: `contactsafe.robot.franka`.
 
 Limits, masses, centres and inertias: franka_description, robots/fr3, joint_limits.yaml and inertials.yaml (Franka
-Robotics). Rotor inertia as the torque loop lets it be felt: identified in torque control, MuJoCo Menagerie's
+Robotics). Rotor inertia is what remains of it under the joints' torque control, as identified in MuJoCo Menagerie's
 franka_fr3, 2025-04-25. Friction of this form is not published for the FR3: the Panda's stands in.
 """
 
@@ -73,7 +73,7 @@ FR3 = franka_arm(
             ),
         ),
     ),
-    joints=(
+    joints=(  # q_min, q_max (rad), qd_max (rad/s), tau_max (N m), friction, rotor inertia (kg m²)
         Joint(-2.7437, 2.7437, 2.62, 87.0, FRICTION[0], _LARGE_ROTOR),
         Joint(-1.7837, 1.7837, 2.62, 87.0, FRICTION[1], _LARGE_ROTOR),
         Joint(-2.9007, 2.9007, 2.62, 87.0, FRICTION[2], _LARGE_ROTOR),

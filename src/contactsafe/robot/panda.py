@@ -67,7 +67,7 @@ PANDA = franka_arm(
             (1.2516e-2, 1.0027e-2, 4.815e-3, -4.28e-4, -1.196e-3, -7.41e-4),
         ),
     ),
-    joints=(
+    joints=(  # q_min, q_max (rad), qd_max (rad/s), tau_max (N m), friction, rotor inertia (kg m²)
         Joint(-2.8973, 2.8973, 2.175, 87.0, FRICTION[0], _ROTOR),
         Joint(-1.7628, 1.7628, 2.175, 87.0, FRICTION[1], _ROTOR),
         Joint(-2.8973, 2.8973, 2.175, 87.0, FRICTION[2], _ROTOR),

@@ -16,7 +16,7 @@ from contactsafe.tasks.wiping.whiteboard import CLEAN, INK
 
 
 class InkIndex(NamedTuple):
-    """What lies on N boards, as it was when they were last entered, less what was wiped until they were last looked at.
+    """Where ink lies on N boards: as entered last, less what was wiped off until the index was last updated.
 
     Attributes:
         cells: row and column of each cell that is not clean, in order, int16 (n, rows · columns, 2).
