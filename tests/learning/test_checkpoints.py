@@ -31,7 +31,7 @@ from contactsafe.learning.checkpoints import (  # noqa: E402
 from contactsafe.learning.curves import EventFile  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.packing import pack, unpack  # noqa: E402
-from contactsafe.learning.settings import as_started  # noqa: E402
+from contactsafe.learning.run_settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig, train_vae  # noqa: E402
 

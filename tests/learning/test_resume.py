@@ -28,7 +28,7 @@ from contactsafe.learning.curves import Curves  # noqa: E402
 from contactsafe.learning.encoder import EncoderConfig  # noqa: E402
 from contactsafe.learning.packing import pack, unpack  # noqa: E402
 from contactsafe.learning.recorder import Recorder  # noqa: E402
-from contactsafe.learning.settings import as_started  # noqa: E402
+from contactsafe.learning.run_settings import as_started  # noqa: E402
 from contactsafe.learning.train_policy import train_policy  # noqa: E402
 from contactsafe.learning.train_vae import VaeConfig  # noqa: E402
 from contactsafe.tasks import make_vec  # noqa: E402

@@ -20,9 +20,9 @@ from contactsafe.learning.export import export_bundle, export_encoder  # noqa: E
 from contactsafe.learning.onnx_models import DeployedPolicy, compare, to_onnx  # noqa: E402
 from contactsafe.policy.bundle import Bundle  # noqa: E402
 from contactsafe.policy.conditions import Conditions  # noqa: E402
-from contactsafe.policy.graph import read_graph  # noqa: E402
 from contactsafe.policy.manifest import MANIFEST, digest  # noqa: E402
 from contactsafe.policy.observation import Observation, ObservationScaling  # noqa: E402
+from contactsafe.policy.onnx_graph import read_graph  # noqa: E402
 from contactsafe.policy.operators import RULES  # noqa: E402
 from contactsafe.policy.policy import Policy  # noqa: E402
 from contactsafe.vision.log_polar import FEATURES  # noqa: E402

@@ -52,7 +52,7 @@ def train(arguments: Sequence[str]) -> None:
 
 def _settings(kind: type, program: str, words: list[str], default: Any) -> Any:
     """Read the settings of a training; where it goes on, those of its last session stay unless words say otherwise."""
-    from contactsafe.learning.settings import as_started
+    from contactsafe.learning.run_settings import as_started
 
     config = parse(kind, program, words, default=default)
     return parse(kind, program, words, default=as_started(config)) if config.resume else config

@@ -17,7 +17,7 @@ from contactsafe.learning.packing import pack, unpack
 from contactsafe.learning.policy_config import SESSION_FIELDS, PolicyConfig
 from contactsafe.learning.random_state import check_random_state, load_random_state, random_state
 from contactsafe.learning.replay import ReplayFile
-from contactsafe.learning.settings import check_same_config, check_unchanged, plain
+from contactsafe.learning.run_settings import check_same_config, check_unchanged, plain
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

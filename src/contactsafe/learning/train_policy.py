@@ -18,7 +18,7 @@ from contactsafe.learning.export import export_bundle
 from contactsafe.learning.policy_config import PolicyConfig
 from contactsafe.learning.recorder import Recorder
 from contactsafe.learning.run import Run, load_run
-from contactsafe.learning.settings import plain
+from contactsafe.learning.run_settings import plain
 from contactsafe.learning.vec_env import EncodedVecEnv
 from contactsafe.learning.vision_encoder import VisionEncoder
 from contactsafe.policy.action_config import learned_actions

@@ -18,7 +18,7 @@ from contactsafe.learning.datasets import MaskDataset, SampleMasks, make_dataset
 from contactsafe.learning.encoder import VAE, EncoderConfig, vae_loss
 from contactsafe.learning.export import export_encoder
 from contactsafe.learning.probe import batches, nearest_foreground_error, reconstruction_report
-from contactsafe.learning.settings import check_same_config, plain
+from contactsafe.learning.run_settings import check_same_config, plain
 from contactsafe.policy.bundle import ENCODER, ENCODER_DESCRIPTION
 from contactsafe.policy.perception import ENCODER_FORMAT, Perception
 from contactsafe.tasks import DEFAULT_TASK, TASKS

@@ -10,8 +10,8 @@ import numpy as np
 from contactsafe.core.errors import BundleError, InvalidInputError, shown
 from contactsafe.learning.checkpoints import CHECKPOINT
 from contactsafe.policy.bundle import ENCODER, ENCODER_DESCRIPTION, MAX_MODEL_BYTES
-from contactsafe.policy.graph import check_ports, read_graph
 from contactsafe.policy.manifest import BOUNDS, MAX_LATENT, MAX_MANIFEST_BYTES, digest, read_bounded
+from contactsafe.policy.onnx_graph import check_ports, read_graph
 from contactsafe.policy.perception import ENCODER_FORMAT, LEARNED, WITH_IMAGE, Perception, encoder_ports, open_session
 
 

@@ -18,8 +18,8 @@ from contactsafe.core.errors import BundleError
 from contactsafe.policy.action_config import ACTIONS
 from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.dither import Dither
-from contactsafe.policy.graph import Ports, check_ports, read_graph
 from contactsafe.policy.manifest import MANIFEST, digest, read_bounded, read_manifest
+from contactsafe.policy.onnx_graph import Ports, check_ports, read_graph
 from contactsafe.policy.perception import LEARNED, NO_IMAGE, encoder_ports, open_session
 
 FOLDER = "bundle"

@@ -5,7 +5,7 @@ import onnxruntime
 
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import BundleError, InvalidInputError
-from contactsafe.policy.graph import Graph, Ports, read_graph
+from contactsafe.policy.onnx_graph import Graph, Ports, read_graph
 from contactsafe.vision.log_polar import CHUNKS, FEATURES, ground_of, log_polar_features
 from contactsafe.vision.rectify import rectify
 

@@ -5,6 +5,6 @@ from contactsafe.report.output import prepare_output
 from contactsafe.report.page import write_report
 from contactsafe.report.scene import View, visible_faces
 from contactsafe.report.summary import write_summary
-from contactsafe.report.table import terminal_table
+from contactsafe.report.terminal import terminal_table
 
 __all__ = ["COLOURS", "View", "prepare_output", "terminal_table", "visible_faces", "write_report", "write_summary"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import contactsafe
 from contactsafe.control import presets
-from contactsafe.report import data, strip, tables
+from contactsafe.report import data, html_tables, strip
 from contactsafe.report.data import RunInfo
 from contactsafe.report.film import film_json
 from contactsafe.report.plots import Plotter, spans
@@ -22,15 +22,15 @@ def parts(experiments: Sequence[Experiment], names: Sequence[str], info: RunInfo
     """Return every piece of the page's template by name, as HTML."""
     plotter = Plotter(names)
     key = [
-        f"<dt {tables.coloured(name)}>{escape(name)}</dt><dd>{escape(presets.ABOUT.get(name, ''))}</dd>"
+        f"<dt {html_tables.coloured(name)}>{escape(name)}</dt><dd>{escape(presets.ABOUT.get(name, ''))}</dd>"
         for name in names
     ]
     return {
         "version": escape(str(info.get("version", contactsafe.__version__))),
         **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers")),
         "key": "\n".join(key),
-        "cards": tables.cards(experiments, names),
-        "results": tables.table(experiments, names, main_only=True) + tables.tally(experiments, names),
+        "cards": html_tables.cards(experiments, names),
+        "results": html_tables.table(experiments, names, main_only=True) + html_tables.tally(experiments, names),
         "sections": "\n".join(_section(experiment, names, plotter) for experiment in experiments),
         "method": _method(experiments, names, info),
     }
@@ -62,9 +62,9 @@ def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter) -> 
             f'<p class="question">{escape(experiment.question)}</p>',
             _film(experiment),
             *(_figure(experiment, figure, plotter) for figure in experiment.figures),
-            *(tables.plain(own) for own in experiment.tables),
-            f"<h3>All figures</h3>{tables.table([experiment], names)}",
-            tables.verdict(experiment, names),
+            *(html_tables.plain(own) for own in experiment.tables),
+            f"<h3>All figures</h3>{html_tables.table([experiment], names)}",
+            html_tables.verdict(experiment, names),
             "</section>",
         ]
     )

@@ -6,8 +6,8 @@ import numpy as np
 
 from contactsafe.report import data
 from contactsafe.report.film import first_contact, force
+from contactsafe.report.html_tables import coloured
 from contactsafe.report.scene import fit, picture
-from contactsafe.report.tables import coloured
 from contactsafe.results.experiment import Experiment
 from contactsafe.results.recording import Recording, Stage
 
