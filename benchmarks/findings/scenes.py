@@ -32,9 +32,7 @@ def hold(
     """Let arms as modelled hold the tool at home, each pushed on one link from 0.2 s on; traces, (worlds, T)."""
     worlds = Worlds(ARM, WorldConfig(sensors=NO_NOISE, obstacles=obstacles), config, len(pushes), 0)
     for i, (link, force) in enumerate(pushes):
-        worlds.reset(i, ARM.home)
-        worlds.controllers[i]["target"]["K_task"] = STIFFNESS
-        worlds.controllers[i]["target"]["D_task"] = 2.0 * np.sqrt(STIFFNESS)
+        worlds.reset(i, ARM.home, STIFFNESS)
         if link:
             worlds.push(i, f"link{link}", PUSH_POINTS[link], force, 0.2, seconds)
     step = np.zeros((worlds.n, 10), dtype=trace_dtype(ARM.n))
