@@ -6,7 +6,7 @@ Trains the same task with the gains set by the policy, and kept low, in the midd
 the policy over `safe` and over `vices`, with and without a reward that asks for gentle contacts. Each with the same
 steps and seeds, one training after the other; those that are done already are not done again, and one that was stopped
 goes on. Then each policy, and each scripted one, meets the same held-out episodes, and a table is printed. How fast
-each learns is what `tools/learning_curves.py` says of the same folders.
+each learns is what `benchmarks/learning_curves.py` says of the same folders.
 """
 
 import argparse

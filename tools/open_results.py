@@ -5,15 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "concepts" / "open.md"
-BLOCK = re.compile(r"(```sh\npython docs/findings\.py (\d+)\n```\n```text\n)(.*?)(```)", re.DOTALL)
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "concepts" / "open.md"
+BLOCK = re.compile(r"(```sh\npython -m benchmarks\.findings (\d+)\n```\n```text\n)(.*?)(```)", re.DOTALL)
 
 
 def printed(number: str) -> str:
-    """Run one finding and give what it prints below its heading."""
-    command = [sys.executable, str(DOCS / "findings.py"), number]
-    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[1:]
+    """Run one finding and return what it prints below its heading."""
+    command = [sys.executable, "-m", "benchmarks.findings", number]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout.splitlines()[1:]
     return "".join(f"{line.strip()}\n" for line in lines)
 
 

@@ -55,6 +55,23 @@ def test_config_of_the_wrong_kind(panda):
     assert refusal(Controller, panda, "safe") == text
 
 
+def test_reset_holds_the_pose_with_the_stiffness_that_is_given_and_knows_where_the_tool_is(panda):
+    made, stiffness = Controller(panda), np.array([100.0, 200.0, 300.0, 400.0, 500.0, 600.0])
+    made.reset(panda.home, stiffness=stiffness)
+    for held in (made.record["target"], made.record["state"]["target"]):
+        assert_array_equal(held["K_task"], stiffness)
+        assert_array_equal(held["D_task"], 2.0 * np.sqrt(stiffness))
+    assert_allclose(made.record["output"]["position"], panda.tool_pose(panda.home).position, rtol=0, atol=1e-12)
+    made.reset(panda.home)
+    assert_array_equal(made.record["target"]["K_task"], np.full(6, 150.0))
+
+
+def test_reset_with_a_stiffness_that_is_not_allowed(panda):
+    text = "stiffness[0] = 2000 1/s² is outside [10, 1500]; scale it or widen stiffness_range of the ControllerConfig"
+    assert refusal(Controller(panda).reset, panda.home, None, None, np.full(6, 2000.0)) == text
+    assert refusal(Controller(panda).reset, panda.home, None, None, 200.0).startswith("stiffness has shape ()")
+
+
 def test_step_before_reset(panda):
     text = "the controller was not reset; call reset(q) with the measured joint positions first"
     assert refusal(Controller(panda).step, Measurement(panda.home, np.zeros(7)), hold(panda)) == text

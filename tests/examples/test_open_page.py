@@ -3,24 +3,22 @@
 import re
 
 import pytest
-from tests.docs import DOCS, assert_prints, program
+from benchmarks.findings.__main__ import FINDINGS, main
+from tests.docs import DOCS, assert_prints
 
 from contactsafe.control.config import STAGE_OF
 from contactsafe.experiments.registry import ENTRIES
 
 PAGE = (DOCS / "concepts" / "open.md").read_text(encoding="utf-8")
-QUOTED = dict(re.findall(r"^python docs/findings\.py (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL))
+QUOTED = dict(
+    re.findall(r"^python -m benchmarks\.findings (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+)
 WITHOUT_FIGURES = {"9"}
 
 
-@pytest.fixture(scope="module")
-def findings():
-    return program("findings")
-
-
-def test_every_finding_of_the_page_has_a_function_and_a_figure(findings):
+def test_every_finding_of_the_page_has_a_function_and_a_figure():
     claimed = set(re.findall(r"^\*\*(\d+)\.\*\*", PAGE, re.MULTILINE))
-    assert claimed - WITHOUT_FIGURES == set(QUOTED) == {str(number) for number in findings.FINDINGS}
+    assert claimed - WITHOUT_FIGURES == set(QUOTED) == {str(number) for number in FINDINGS}
     assert all(text.strip() for text in QUOTED.values())
 
 
@@ -29,14 +27,14 @@ def test_the_table_lists_them_all():
 
 
 @pytest.mark.parametrize("number", ["2", "10"])
-def test_figures_are_what_the_program_prints(findings, number, capsys):
-    assert findings.main([number]) == 0
+def test_figures_are_what_the_program_prints(number, capsys):
+    assert main([number]) == 0
     printed = capsys.readouterr().out.splitlines()[1:]
     assert_prints("".join(f"{line.strip()}\n" for line in printed), QUOTED[number])
 
 
-def test_an_unknown_finding_is_refused(findings, capsys):
-    assert findings.main(["9"]) == 2
+def test_an_unknown_finding_is_refused(capsys):
+    assert main(["9"]) == 2
     assert "give numbers out of 1, 2, " in capsys.readouterr().err
 
 

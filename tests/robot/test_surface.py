@@ -35,7 +35,7 @@ class Placed:
     def search(self, torque):
         """Return the link found for a contact torque, and the lever arm there, m."""
         scratch = np.zeros(self.arm.n)
-        best, _ = best_point(self.handle, 0, len(self.arm.surface), torque, scratch, -1, 0.0)
+        best, _ = best_point(self.handle, 0, len(self.arm.surface), torque, self.arm.lever_doubted, scratch, -1, 0.0)
         return surface_torque(self.handle, best, scratch), np.linalg.norm(scratch)
 
 
@@ -90,10 +90,10 @@ def test_search_in_parts_is_the_search_at_once(panda):
     placed, rng = Placed(panda, panda.home), np.random.default_rng(0)
     for _ in range(20):
         torque, scratch = rng.normal(size=7), np.zeros(7)
-        whole = best_point(placed.handle, 0, 480, torque, scratch, -1, 0.0)
+        whole = best_point(placed.handle, 0, 480, torque, 0.0, scratch, -1, 0.0)
         best, fit = -1, 0.0
         for start in range(0, 480, 60):
-            best, fit = best_point(placed.handle, start, start + 60, torque, scratch, best, fit)
+            best, fit = best_point(placed.handle, start, start + 60, torque, 0.0, scratch, best, fit)
         assert (best, fit) == whole
         for index in range(480):
             surface_torque(placed.handle, index, scratch)

@@ -1,7 +1,6 @@
 """What commands have in common: kinds of options, the progress bar, and the word before the first compilation."""
 
 import functools
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +12,7 @@ from contactsafe.control import presets
 from contactsafe.core.compiled import CACHE_FOLDER
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of, some_of
+from contactsafe.core.progress import progress_bar
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.tasks import DEFAULT_TASK, TASKS
 
@@ -58,5 +58,5 @@ def described(what: str) -> str:
 
 
 def progress(what: str, total: int) -> tqdm:
-    """Begin a progress bar on stderr."""
-    return tqdm(total=total, desc=described(what), file=sys.stderr)
+    """Begin to show progress on stderr."""
+    return progress_bar(total=total, desc=described(what))

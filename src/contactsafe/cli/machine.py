@@ -1,17 +1,15 @@
 """`contactsafe bench` and `contactsafe warmup`: how fast this machine is, and what compiles on it beforehand."""
 
-import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-from tqdm import tqdm
-
 from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress
 from contactsafe.cli.experiments import scenes_of
 from contactsafe.core.compiled import CACHE_FOLDER
 from contactsafe.core.parse import some_of
+from contactsafe.core.progress import progress_bar
 from contactsafe.results.experiment import to_json
 from contactsafe.tasks import DEFAULT_TASK
 
@@ -55,7 +53,7 @@ def warmup(joints: Joints = ("6", "7")) -> None:
 
     started = time.monotonic()
     parts = steps(joints)
-    with tqdm(total=len(parts), desc="compiling", file=sys.stderr) as bar:
+    with progress_bar(total=len(parts), desc="compiling") as bar:
         for name, run in parts.items():
             bar.set_description_str(name)
             run()

@@ -90,7 +90,7 @@ def surface_torque(handle: Record, index: int, out: Vector) -> int:
 
 @compiled
 def best_point(
-    handle: Record, start: int, stop: int, torque: Vector, scratch: Vector, best: int, best_fit: float
+    handle: Record, start: int, stop: int, torque: Vector, doubted: float, scratch: Vector, best: int, best_fit: float
 ) -> tuple[int, float]:
     """Return the point that explains a joint torque best, of part of the surface and the best one so far; its fit.
 
@@ -98,17 +98,18 @@ def best_point(
         handle: of the nominal model.
         start, stop: points searched.
         torque: of the contact on the arm, (n,), N m.
+        doubted: lever arm at which a point is hardly believed to be a contact, m.
         scratch: (n,); overwritten.
         best, best_fit: point of those searched before, −1 for none, and its fit: the cosine between its torque and the
             one found, less where its lever arm is short.
     """
-    doubted = handle.lever_doubted * handle.lever_doubted
+    doubted_squared = doubted * doubted
     for index in range(start, stop):
         surface_torque(handle, index, scratch)
         along = dot(scratch, torque)
         if not along > _NO_LEVER:
             continue
-        fit = along / math.sqrt((dot(scratch, scratch) + doubted) * dot(torque, torque))
+        fit = along / math.sqrt((dot(scratch, scratch) + doubted_squared) * dot(torque, torque))
         if fit > best_fit:
             best, best_fit = index, fit
     return best, best_fit

@@ -91,7 +91,13 @@ class Controller(Independent):
         self._kept = _views(self._records["target"], self._index)["kept"]
         self.record["handle"] = self._nominal.handle
 
-    def reset(self, q: ArrayLike, qd: ArrayLike | None = None, torque: ArrayLike | None = None) -> None:
+    def reset(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+        stiffness: ArrayLike | None = None,
+    ) -> None:
         """Forget everything and hold the present pose, taking the arm over as it is: at rest, moving, or held against.
 
         The command goes on from the torque last sent, within the torque rate limit; whoever knows it says so. Else it
@@ -102,16 +108,21 @@ class Controller(Independent):
             q: measured joint positions, (n,), rad; up to `RANGE_TOLERANCE` past a joint's limit.
             qd: measured joint velocities, (n,), rad/s; None for an arm at rest.
             torque: joint torque last sent, gravity included, (n,), N m; None where it is not known.
+            stiffness: K1 with which the pose is held until a target is given, (6,), 1/s²; None for 150.
 
         Raises:
-            InvalidInputError: a wrong shape, a number that is not finite, joints outside their range, or more torque
-                than the arm's limit.
+            InvalidInputError: a wrong shape, a number that is not finite, joints or stiffness outside their range, or
+                more torque than the arm's limit.
         """
         q = in_range(self.arm, self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
         qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
         qd = believable(qd, self.record["params"]["arm"]["qd_most"])
         dynamics = self._loaded.dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else within_limit(self.arm, torque)
+        allowed = self.config.impedance.stiffness_range
+        held_by = np.clip(np.full(6, _HELD_STIFFNESS), *allowed)
+        if stiffness is not None:
+            held_by = checked_gain(stiffness, "stiffness", "1/s²", allowed)
         for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
         self.record["dynamics"] = dynamics
@@ -121,9 +132,11 @@ class Controller(Independent):
         pose = self.arm.tool_pose(q)
         held = state["target"]
         held["position"], held["quat"], held["q_posture"] = pose.position, pose.quat, q
-        held["K_task"] = np.clip(_HELD_STIFFNESS, *self.config.impedance.stiffness_range)
-        held["D_task"] = np.clip(2.0 * np.sqrt(held["K_task"]), *self.config.impedance.damping_range)
+        held["K_task"] = held_by
+        held["D_task"] = np.clip(2.0 * np.sqrt(held_by), *self.config.impedance.damping_range)
         self.record["target"] = held
+        for name in ("position", "rotation"):
+            self.record["output"][name] = dynamics[name]
         self._last_numbers = []
         self._is_reset = True
 

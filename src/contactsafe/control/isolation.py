@@ -38,7 +38,7 @@ def isolation_dtype(n: int) -> np.dtype:
 
 
 @inlined
-def isolate(isolation: Record, handle: Record, link: int, torque: Vector) -> None:
+def isolate(isolation: Record, handle: Record, link: int, torque: Vector, lever_doubted: float) -> None:
     """Take the direction from the contact's torque, and look for its place on the surface.
 
     All of the surface is searched when a contact is found, later a part each tick. Lever arms are smoothed: a contact
@@ -49,6 +49,7 @@ def isolate(isolation: Record, handle: Record, link: int, torque: Vector) -> Non
         handle: of the nominal model, up to date.
         link: the furthest that detection found, 1 … n; it stands where the arm has no surface samples.
         torque: of the contact on the arm, (n,), N m.
+        lever_doubted: of the arm, m; see `best_point`.
     """
     isolation.direction[:] = torque / _size(torque)
     first = isolation.link == 0
@@ -60,8 +61,8 @@ def isolate(isolation: Record, handle: Record, link: int, torque: Vector) -> Non
     stop = points if first else min(isolation.search_at + _POINTS_A_TICK, points)
     point_torque = np.empty(torque.shape[0])
     isolation.search_point, isolation.search_fit = best_point(
-        handle, isolation.search_at, stop, isolation.direction, point_torque, isolation.search_point,
-        isolation.search_fit,
+        handle, isolation.search_at, stop, isolation.direction, lever_doubted, point_torque,
+        isolation.search_point, isolation.search_fit,
     )  # fmt: skip
     isolation.search_at = stop % points if points > 0 else 0
     if isolation.search_at == 0 and isolation.search_point >= 0:

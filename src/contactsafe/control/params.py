@@ -55,11 +55,11 @@ def _resolved(n: int) -> dict[str, list[tuple]]:
 
 
 def arm_dtype(n: int) -> np.dtype:
-    """Describe the limits of the arm that are in force."""
+    """Describe what is read of the arm beside its model: the limits in force, and what a user knows of it."""
     return np.dtype(
         [(name, _f, (n,)) for name in ("q_min", "q_max", "qd_max", "tau_max", "runaway_speed", "reversal_s")]
         + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
-        + [("friction", _f, (n, 3))]
+        + [("friction", _f, (n, 3)), ("lever_doubted", _f)]  # the latter in m
     )
 
 
@@ -122,7 +122,7 @@ def _fill_arm(limits: np.void, config: ControllerConfig, arm: Arm) -> None:
     limits["qd_max"] = config.limits.joint_speed_fraction * limits["runaway_speed"]
     # From full drive to full braking of all that may drive a joint, and the lag of what is measured.
     limits["reversal_s"] = 2.0 * arm.tau_max.max() / arm.torque_rate_max + 10.0 * config.clock.loop_delay_s
-    limits["tau_max"], limits["friction"] = arm.tau_max, arm.friction
+    limits["tau_max"], limits["friction"], limits["lever_doubted"] = arm.tau_max, arm.friction, arm.lever_doubted
     limits["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - OUTSIDE_RAD
     limits["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + OUTSIDE_RAD
     limits["qd_most"] = np.minimum(_FASTER * arm.qd_max, _speed_gained(arm))

@@ -24,7 +24,7 @@ def supervise(c: Record) -> None:
     elif state.mode == FREE and touched and params.reaction.contact_aware != 0:
         switch(state, COMPLY)
     if state.mode != FREE and link != 0:
-        isolate(state.isolation, c.handle, link, torque)
+        isolate(state.isolation, c.handle, link, torque, params.arm.lever_doubted)
     follow_velocity(state.classification, state.arm.qd, state.step)
     if state.mode != FREE:
         shown = classify(

@@ -5,7 +5,8 @@ import numpy as np
 from contactsafe.control.codes import COMPLY, FREE, REJECT
 from contactsafe.experiments.collision_motions import Motion
 from contactsafe.experiments.collision_scenes import Meeting
-from contactsafe.results.metrics import CONTACT_N, Metric
+from contactsafe.experiments.obstacle_metrics import obstacle_metrics
+from contactsafe.results.metrics import Metric
 from contactsafe.robot.arm import Arm
 
 METRICS = (
@@ -57,22 +58,10 @@ def collision_metrics(trace: np.ndarray, free: np.ndarray, arm: Arm) -> dict[str
         free: the same motion with nothing in its path, (T,).
         arm: for its joint range.
     """
-    force = trace["obstacle_force"]
-    touching = force > CONTACT_N
-    steady = trace["time"] > trace["time"][-1] - STEADY_S
-    tau = np.abs(trace["tau_arm"]).max(axis=1)
     away = np.linalg.norm(trace["position"] - free["position"], axis=1)
     at_limit = ((trace["q"] < arm.q_min + _AT_LIMIT_RAD) | (trace["q"] > arm.q_max - _AT_LIMIT_RAD)).any(axis=1)
-    first = int(np.argmax(touching))
-    reported = trace["link"][first:] > 0
     return {
-        "met": float(touching.any()),
-        "contact_peak_n": float(force.max()),
-        "contact_steady_n": float(force[steady].mean()),
-        "impulse_ns": float(force.sum() / 1000.0),
-        "tau_peak_nm": float(tau.max()),
-        "tau_steady_nm": float(tau[steady].mean()),
-        "detect_ms": float(np.argmax(reported)) if touching.any() and reported.any() else float("nan"),
+        **obstacle_metrics(trace, STEADY_S, of_met_only=False, reported_before_ms=0.0),
         "tool_error_mm": float(1000.0 * away.max()),
         "tool_error_end_mm": float(1000.0 * away[-1]),
         "tool_force_peak_n": float(np.linalg.norm(trace["tool_force"], axis=1).max()),

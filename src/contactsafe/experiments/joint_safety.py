@@ -1,5 +1,6 @@
 """Joint safety: while the policy works, the forearm runs into something that is held in its path."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from contactsafe.control.codes import FREE
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.franka_links import FOREARM, require_franka_links
+from contactsafe.experiments.obstacle_metrics import last_part, obstacle_metrics
 from contactsafe.experiments.run import policy_for, run_policy, steps_in
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, largest, scalar
@@ -151,21 +153,12 @@ def contact_metrics(trace: np.ndarray) -> dict[str, float]:
     Args:
         trace: `trace_dtype` records, (T,).
     """
-    force = trace["obstacle_force"]
-    touching = force > CONTACT_N
-    names = (
-        "contact_peak_n", "contact_steady_n", "impulse_ns", "tau_peak_nm", "tau_steady_nm", "residual_peak_nm",
-        "residual_steady_nm", "detect_ms", "tool_force_peak_n", "mode_switches",
-    )  # fmt: skip
-    if not touching.any():
-        return dict.fromkeys(names, float("nan")) | {"met": 0.0}
-    steady = trace["time"] > trace["time"][-1] - STEADY_S
-    tau, residual = np.abs(trace["tau_arm"]).max(axis=1), np.abs(trace["residual"]).max(axis=1)
-    reported = trace["link"][int(np.argmax(touching)) :] > 0
-    detect = float(np.argmax(reported)) if reported.any() and not reported[0] else float("nan")
-    switches = int(np.count_nonzero(np.diff(trace["mode"] != FREE)))
-    values = (
-        force.max(), force[steady].mean(), force.sum() / 1000.0, tau.max(), tau[steady].mean(), residual.max(),
-        residual[steady].mean(), detect, np.linalg.norm(trace["tool_force"], axis=1).max(), switches,
-    )  # fmt: skip
-    return {name: float(value) for name, value in zip(names, values, strict=True)} | {"met": 1.0}
+    found = obstacle_metrics(trace, STEADY_S, of_met_only=True, reported_before_ms=math.nan)
+    residual = np.abs(trace["residual"]).max(axis=1)
+    more = {
+        "residual_peak_nm": float(residual.max()),
+        "residual_steady_nm": float(residual[last_part(trace, STEADY_S)].mean()),
+        "tool_force_peak_n": float(np.linalg.norm(trace["tool_force"], axis=1).max()),
+        "mode_switches": float(np.count_nonzero(np.diff(trace["mode"] != FREE))),
+    }
+    return found | (more if found["met"] else dict.fromkeys(more, math.nan))

@@ -32,11 +32,8 @@ class Playback(Independent):
         self._step, self._nominal = 0, worlds.arm.nominal()
         self._bind()
         for i, motion in enumerate(motions):
-            worlds.reset(i, motion.q_start)
+            worlds.reset(i, motion.q_start, motion.stiffness)
             self._target["quat"][i] = motion.start.quat
-            self._target["K_task"][i] = motion.stiffness
-            self._target["D_task"][i] = 2.0 * np.sqrt(motion.stiffness)
-        self._tool[:] = worlds.controllers["dynamics"]["position"]
 
     def _bind(self) -> None:
         controllers = self.worlds.controllers

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from tqdm import tqdm
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.progress import progress_bar
 from contactsafe.policy.perception import LEARNED
 from contactsafe.vision.rectify import rectify
 
@@ -70,7 +70,7 @@ def make_dataset(
     packed = np.empty((count, size, size // 8), dtype=np.uint8)
     starts = range(0, count, CHUNK)
     seeds = np.random.SeedSequence(seed).generate_state(len(starts))
-    for start, chunk_seed in zip(tqdm(starts, desc="sampling masks", unit="chunk"), seeds, strict=True):
+    for start, chunk_seed in zip(progress_bar(starts, desc="sampling masks", unit="chunk"), seeds, strict=True):
         n = min(CHUNK, count - start)
         masks, tools = sample_masks(n, int(chunk_seed))
         if representation == "tool":

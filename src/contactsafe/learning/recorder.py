@@ -7,6 +7,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from contactsafe.core.copying import OfTraining
+from contactsafe.core.progress import progress_bar
 from contactsafe.learning.run import Run
 
 
@@ -26,7 +27,7 @@ class Recorder(OfTraining, BaseCallback):
         self.started = time.monotonic()
         self.period = run.config.rollout_steps * run.config.num_envs
         self.over = False
-        self.bar: tqdm = tqdm(disable=True)
+        self.bar: tqdm = progress_bar(disable=True)
 
     def minutes(self) -> float:
         """Time trained over all sessions, min."""
@@ -40,7 +41,7 @@ class Recorder(OfTraining, BaseCallback):
 
     def _on_training_start(self) -> None:
         name = self.config.algorithm.upper()
-        self.bar = tqdm(
+        self.bar = progress_bar(
             total=self.config.total_steps, initial=self.model.num_timesteps, desc=name, unit="step", mininterval=1.0
         )
 

@@ -9,9 +9,9 @@ from typing import Any
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger
-from tqdm import tqdm
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.progress import progress_bar
 from contactsafe.learning.checkpoints import run_folder, write_json
 from contactsafe.learning.curves import Curves
 from contactsafe.learning.export import export_bundle
@@ -199,7 +199,7 @@ def _evaluate(folder: Path, make_env: MakeEnv, config: PolicyConfig) -> dict[str
     env = make_env(min(config.num_envs, config.evaluate_episodes))
     try:
         policy = Policy(folder, _homography(env))
-        with tqdm(total=config.evaluate_episodes, desc="held-out episodes", unit="episode") as bar:
+        with progress_bar(total=config.evaluate_episodes, desc="held-out episodes", unit="episode") as bar:
             seed = config.seed + HELD_OUT_SEED
             results = evaluate_policy(
                 policy, env, config.evaluate_episodes, seed, config.rate_hz, lambda _: bar.update()

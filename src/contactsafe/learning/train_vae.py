@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
-from tqdm import tqdm
 
 from contactsafe.core.parse import one_of
+from contactsafe.core.progress import progress_bar
 from contactsafe.learning.checking import check_like, check_optimiser, entry, whole
 from contactsafe.learning.checkpoints import load_checkpoint, refused_as, run_folder, save_checkpoint, write_json
 from contactsafe.learning.curves import EventFile
@@ -142,7 +142,8 @@ def _train_epoch(
     noise = torch.Generator().manual_seed(config.seed * 100_003 + epoch)
     steps = max(1, len(data) // config.batch)
     totals = np.zeros(3)
-    for step in tqdm(range(steps), desc=f"VAE epoch {epoch + 1}/{config.epochs}", unit="batch", mininterval=1.0):
+    name = f"VAE epoch {epoch + 1}/{config.epochs}"
+    for step in progress_bar(range(steps), desc=name, unit="batch", mininterval=1.0):
         progress = epoch + step / steps
         for group in optimiser.param_groups:
             falling = 0.5 * (1.0 + math.cos(math.pi * progress / config.epochs))

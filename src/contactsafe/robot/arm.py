@@ -40,15 +40,14 @@ class NominalModel(Independent):
 
     _bound = ("_data", "handle")
 
-    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray, lever_doubted: float):
+    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray):
         self._model = model
         self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
-        self._lever_doubted = lever_doubted
         self._bind()
 
     def _bind(self) -> None:
         self._data = mujoco.MjData(self._model)
-        self.handle = make_handle(self._model, self._data, self._site, self._surface, self._lever_doubted)[0]
+        self.handle = make_handle(self._model, self._data, self._site, self._surface)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ class Arm(Independent):
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site, self.surface, self.lever_doubted)
+        return NominalModel(self.model, self.site, self.surface)
 
     def joint_vector(self, value: ArrayLike, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.

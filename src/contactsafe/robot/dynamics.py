@@ -39,7 +39,6 @@ handle_dtype = np.dtype(
         ("tool_body", np.int64),
         ("nbody", np.int64),
         ("gravity", np.float64, (3,)),
-        ("lever_doubted", np.float64),
     ]
 )
 """Where a compiled function finds one nominal model: addresses of MjModel, MjData and its arrays; body numbers."""
@@ -66,20 +65,16 @@ def dynamics_dtype(n: int) -> np.dtype:
     )
 
 
-def make_handle(
-    model: mujoco.MjModel, data: mujoco.MjData, site: str, surface: np.ndarray, lever_doubted: float
-) -> np.ndarray:
+def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str, surface: np.ndarray) -> np.ndarray:
     """Fill a handle for a model of one serial arm, array of one `handle_dtype` record.
 
-    The caller keeps `model`, `data` and `surface` (rows as in `contactsafe.robot.surface`) alive as long as the handle;
-    `lever_doubted`, m, is the arm's.
+    The caller keeps `model`, `data` and `surface` (rows as in `contactsafe.robot.surface`) alive as long as the handle.
     """
     handle = np.zeros(1, dtype=handle_dtype)
     handle["model"], handle["data"] = model._address, data._address
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
     handle["surface"], handle["surface_points"] = surface.ctypes.data, len(surface)
-    handle["lever_doubted"] = lever_doubted
     handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id

@@ -164,15 +164,15 @@ class Worlds(Independent):
             streams = [np.random.SeedSequence(one) for one in seed]
         self.rngs = [np.random.Generator(np.random.SFC64(stream)) for stream in streams]
 
-    def reset(self, i: int, q: ArrayLike) -> None:
-        """Put world i's arm at rest at q (n,) rad, with a new sensor bias."""
+    def reset(self, i: int, q: ArrayLike, stiffness: ArrayLike | None = None) -> None:
+        """Put world i's arm at rest at q (n,) rad, with a new sensor bias; `stiffness` as of `Controller.reset`."""
         q = self.arm.joint_vector(q, "q")
         model, data, record = self.models[i], self.datas[i], self.records[i]
         mujoco.mj_resetData(model, data)
         model.qpos_spring[self.arm.n :] = model.qpos0[self.arm.n :]  # obstacles that travelled are back
         data.qpos[: self.arm.n] = q
         gravity = self.arm.dynamics(q, np.zeros(self.arm.n))["g"]
-        self._owners[i].reset(q, torque=np.clip(gravity, -self.arm.tau_max, self.arm.tau_max))
+        self._owners[i].reset(q, None, np.clip(gravity, -self.arm.tau_max, self.arm.tau_max), stiffness)
         data.ctrl[:] = gravity
         mujoco.mj_forward(model, data)
         record["tick"], record["push"]["body"], record["plant"]["obstacle_stopped"] = 0, 0, 0

@@ -5,7 +5,7 @@ from tests.sim.scenes import CALM, panda, run, worlds_at
 
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 from contactsafe.tasks.wiping.board import BoardConfig, Camera, furnish, pad_half
-from contactsafe.tasks.wiping.whiteboards import Whiteboards, erase
+from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 BOARD = BoardConfig()
 CAMERA = Camera()
@@ -33,8 +33,7 @@ class Scene:
         while ticks > 0:
             count = min(ticks, MAX_TICKS)
             rows.append(run(worlds, count)[0])
-            metrics, tick = worlds.metrics[0], worlds.records[0]["tick"]
-            erase(boards.records[0], boards.cells[0], tick - metrics["ticks"], metrics, worlds.samples[0])
+            boards.erase(0, 1, worlds)
             ticks -= count
         return np.concatenate(rows)
 

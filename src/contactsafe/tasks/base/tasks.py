@@ -174,15 +174,10 @@ class Tasks(Independent):
             rng: draws the episode.
             options: some of `reset_options`.
         """
-        self.worlds.reset(i, self.posture_over(self.begin(i, rng, options)))
+        q = self.posture_over(self.begin(i, rng, options))
+        self.worlds.reset(i, q, self.config.action.stiffness_first)
         if self._pushes is not None:
             self._pushes.begin(i, rng)
-        controller = self.worlds.controllers[i]
-        target = controller["target"]
-        target["K_task"] = self.config.action.stiffness_first
-        target["D_task"] = 2.0 * np.sqrt(target["K_task"])
-        controller["output"]["position"] = controller["dynamics"]["position"]
-        controller["output"]["rotation"] = controller["dynamics"]["rotation"]
         task = self.tasks[i]
         task["steps"], task["success"], task["failed"] = 0, 0, 0
         observe_one(self.worlds.controllers, self.tasks, i)

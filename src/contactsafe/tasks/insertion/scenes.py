@@ -9,13 +9,14 @@ import numpy as np
 from contactsafe.policy.action import DOWN
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
-from contactsafe.results.recording import Stage, level_rectangle
+from contactsafe.results.recording import level_rectangle
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose, description_and_tool
+from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes
+from contactsafe.tasks.base.scenes import TaskScenes
 from contactsafe.tasks.base.scripted import hold_still
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scene import BLOCK_HALF, PEG
@@ -53,7 +54,7 @@ class InsertionEpisodes(TaskEpisodes):
         return np.where(open_, HOLE, 0).astype(np.uint8)
 
 
-class Insertion:
+class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
     """The insertion task for `contactsafe.experiments.task.ExperimentTask`.
 
     Args:
@@ -61,6 +62,7 @@ class Insertion:
         arm: that works; None for a Panda with a peg.
     """
 
+    tasks_type = InsertionTasks
     name = "inserting"
     policy = "A learned policy puts a peg into a hole that it must find by touch, with a simulated Franka Panda."
     metrics: tuple[Metric, ...] = (
@@ -72,21 +74,13 @@ class Insertion:
     panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)
 
     def __init__(self, config: InsertionConfig | None = None, arm: Arm | None = None):
-        self._config, self.arm = config or InsertionConfig(), arm or robots.panda(PEG)
-        face = level_rectangle(self._config.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF))
-        self.stage = Stage(*description_and_tool(self.arm), face, {HOLE: (20,) * 3})
-
-    def _tasks(
-        self, config: InsertionConfig, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
-    ) -> InsertionTasks:
-        return InsertionTasks(config, len(seeds), list(seeds), worlds, self.arm)
-
-    def _under(self, controller: str) -> InsertionConfig:
-        return replace(self._config, controller=controller)
+        config = config or InsertionConfig()
+        face = level_rectangle(config.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF))
+        super().__init__(config, arm or robots.panda(PEG), face, {HOLE: (20, 20, 20)})
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> InsertionEpisodes:
         """Return held-out holes."""
-        return InsertionEpisodes(self._tasks(self._under(controller), seeds), seeds)
+        return InsertionEpisodes(self.make_tasks(self.under(controller), seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
@@ -99,7 +93,7 @@ class Insertion:
         travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
         coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
         worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
-        return InsertionEpisodes(self._tasks(self._under(controller), seeds, worlds), seeds)
+        return InsertionEpisodes(self.make_tasks(self.under(controller), seeds, worlds), seeds)
 
     def scripted(
         self,
@@ -112,7 +106,7 @@ class Insertion:
         """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
         action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
         config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
-        tasks = self._tasks(config, seeds, worlds)
+        tasks = self.make_tasks(config, seeds, worlds)
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
         return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else hold_still
 

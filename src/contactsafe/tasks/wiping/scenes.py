@@ -3,7 +3,6 @@
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,13 +10,14 @@ from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
-from contactsafe.results.recording import Stage, level_rectangle
+from contactsafe.results.recording import level_rectangle
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose, description_and_tool
+from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
+from contactsafe.tasks.base.scenes import TaskScenes
 from contactsafe.tasks.base.scripted import hold_still
 from contactsafe.tasks.wiping.camera import render_mask_into
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -60,7 +60,7 @@ class WipingEpisodes(TaskEpisodes):
         return {f"mask, {size} × {size}": (mask, 50)}
 
 
-class Wiping:
+class Wiping(TaskScenes[WipingTasks, WipingConfig]):
     """The wiping task for `contactsafe.experiments.task.ExperimentTask`.
 
     Args:
@@ -68,6 +68,7 @@ class Wiping:
         arm: that works; None for a Panda with a wiper.
     """
 
+    tasks_type = WipingTasks
     name = "wiping"
     policy = "A learned policy wipes ink off a whiteboard with a simulated Franka Panda."
     metrics: tuple[Metric, ...] = (
@@ -82,21 +83,13 @@ class Wiping:
     panels: tuple[Panel, ...] = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
     def __init__(self, config: WipingConfig | None = None, arm: Arm | None = None):
-        self._config, self.arm = config or WipingConfig(), arm or robots.panda()
-        board = level_rectangle(self._config.board.centre, self._config.board.size)
-        self.stage = Stage(*description_and_tool(self.arm), board, {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
-
-    def _tasks(
-        self, config: WipingConfig, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None
-    ) -> WipingTasks:
-        return WipingTasks(config, len(seeds), list(seeds), worlds, self.arm)
-
-    def _under(self, controller: str) -> WipingConfig:
-        return replace(self._config, controller=controller)
+        config = config or WipingConfig()
+        board = level_rectangle(config.board.centre, config.board.size)
+        super().__init__(config, arm or robots.panda(), board, {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
         """Return held-out boards."""
-        return WipingEpisodes(self._tasks(self._under(controller), seeds), seeds)
+        return WipingEpisodes(self.make_tasks(self.under(controller), seeds), seeds)
 
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
@@ -105,7 +98,7 @@ class Wiping:
         probe, rngs = WipingTasks(WipingConfig(), arm=self.arm), [held_out(seed) for seed in seeds]
         obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
         worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
-        tasks = self._tasks(self._under(controller), seeds, worlds)
+        tasks = self.make_tasks(self.under(controller), seeds, worlds)
         return WipingEpisodes(tasks, seeds, _lured, rngs)
 
     def scripted(
@@ -118,7 +111,7 @@ class Wiping:
     ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return boards and a script: strokes, or nothing just above the board."""
         action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
-        tasks = self._tasks(WipingConfig(controller=controller, action=action), seeds, worlds)
+        tasks = self.make_tasks(WipingConfig(controller=controller, action=action), seeds, worlds)
         x, y, z = tasks.config.board.centre
         start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
         episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))

@@ -1,4 +1,4 @@
-"""What is erased, scored and observed after every policy step, compiled. Runs without the GIL."""
+"""What is scored and observed after every policy step, compiled. Runs without the GIL."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.tasks.base.record import end_step, force_excess, observe_arm
 from contactsafe.tasks.wiping.camera import CameraTables, camera_at, render_mask_into
-from contactsafe.tasks.wiping.ink import InkIndex, nearest_ink, remove_erased
-from contactsafe.tasks.wiping.whiteboards import erase
+from contactsafe.tasks.wiping.ink import nearest_ink, remove_erased
+from contactsafe.tasks.wiping.whiteboards import BoardArrays
 
 REWARD_TERMS = ("ink", "done", "approach", "contact", "time", "force", "arm_table")
 
@@ -53,23 +53,21 @@ def score(task: Record, metrics: Record, rewards: Record, ink: int, distance: fl
 
 @compiled(nogil=True)
 def finish(
-    start: int, stop: int, worlds: np.ndarray, controllers: np.ndarray, metrics: np.ndarray, samples: np.ndarray,
-    boards: np.ndarray, cells: np.ndarray, cameras: CameraTables, ink_index: InkIndex, rewards: Record,
-    tasks: np.ndarray, masks: np.ndarray,
+    start: int, stop: int, worlds: np.ndarray, controllers: np.ndarray, metrics: np.ndarray, boards: BoardArrays,
+    rewards: Record, tasks: np.ndarray,
 ) -> None:  # fmt: skip
-    """Erase, score and look after the ticks of a step, in the worlds from start to stop.
+    """Score and look after the ticks of a step, in the worlds from start to stop, their boards erased.
 
     The arrays are those of `Worlds`, `Whiteboards` and `WipingTasks`.
     """
     for i in range(start, stop):
-        world, board, task = worlds[i], boards[i], tasks[i]
-        erase(board, cells[i], world.tick - metrics[i].ticks, metrics[i], samples[i])
-        camera = camera_at(cameras, board.camera)
-        remove_erased(ink_index, i, cells[i], camera.pixels)
-        ink, distance = nearest_ink(ink_index, i, cells[i], board.origin, board.cell, world.truth.position)
+        world, board, cells, task = worlds[i], boards.records[i], boards.cells[i], tasks[i]
+        camera = camera_at(boards.cameras, board.camera)
+        remove_erased(boards.ink_index, i, cells, camera.pixels)
+        ink, distance = nearest_ink(boards.ink_index, i, cells, board.origin, board.cell, world.truth.position)
         score(task, metrics[i], rewards, ink, distance)
         end_step(metrics[i], task)
-        observe(world.plant, controllers[i], camera, ink_index.shown[i], task, masks[i])
+        observe(world.plant, controllers[i], camera, boards.ink_index.shown[i], task, boards.masks[i])
 
 
 @compiled

@@ -145,9 +145,9 @@ class WipingTasks(Tasks):
     def finish(self, start: int, stop: int) -> None:
         """Erase, score and look, in the worlds from start to stop."""
         worlds, boards = self.worlds, self.boards
+        boards.erase(start, stop, worlds)
         finish(
-            start, stop, worlds.records, worlds.controllers, worlds.metrics, worlds.samples, boards.records,
-            boards.cells, boards.cameras, boards.ink_index, self._rewards[0], self.tasks, boards.masks,
+            start, stop, worlds.records, worlds.controllers, worlds.metrics, boards.arrays, self._rewards[0], self.tasks
         )  # fmt: skip
         if self._photographs is not None:
             self._photographs.look(start, stop, self.tasks)

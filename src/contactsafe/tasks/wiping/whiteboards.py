@@ -1,7 +1,7 @@
 """The boards of N worlds and the cameras that look at them."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -10,9 +10,10 @@ from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.state import Entry, load_state_dict, of_array, of_records, state_dict
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
-from contactsafe.tasks.wiping.camera import camera_tables, plane_homography, render_mask, stack_cameras
-from contactsafe.tasks.wiping.ink import empty_ink_index, enter
+from contactsafe.tasks.wiping.camera import CameraTables, camera_tables, plane_homography, render_mask, stack_cameras
+from contactsafe.tasks.wiping.ink import InkIndex, empty_ink_index, enter
 from contactsafe.tasks.wiping.whiteboard import CLEAN, INK, OBJECT, Whiteboard, erase_under_pad
 
 _ERASE_EVERY = 8  # ticks: at 0.4 m/s the pad moves 3 mm between, a twentieth of its width
@@ -27,6 +28,16 @@ board_dtype = np.dtype(
     ]
 )
 """One world's board, for compiled code."""
+
+
+class BoardArrays(NamedTuple):
+    """What compiled code needs of N boards: the arrays of `Whiteboards` by their names."""
+
+    records: np.ndarray
+    cells: np.ndarray
+    masks: np.ndarray
+    cameras: CameraTables
+    ink_index: InkIndex
 
 
 class Whiteboards(Independent):
@@ -74,6 +85,15 @@ class Whiteboards(Independent):
         for board, cells in zip(self.boards, self.cells, strict=True):
             board.cells = cells
 
+    @property
+    def arrays(self) -> BoardArrays:
+        """Arrays of the boards, for compiled code."""
+        return BoardArrays(self.records, self.cells, self.masks, self.cameras, self.ink_index)
+
+    def erase(self, start: int, stop: int, worlds: Worlds) -> None:
+        """Erase what the pads wiped in the step that the worlds from start to stop have run; without the GIL."""
+        _erase_some(start, stop, self.records, self.cells, worlds.records, worlds.metrics, worlds.samples)
+
     def state_entries(self) -> dict[str, Entry]:
         """List what decides the boards' future."""
         bounds = {"camera": (0, len(self.cameras.pixels) - 1), "pad_half": (-1e9, 1e9)}
@@ -113,6 +133,16 @@ class Whiteboards(Independent):
     def ink_cells(self) -> np.ndarray:
         """Count the cells that hold ink, (n,)."""
         return np.count_nonzero(self.cells == INK, axis=(1, 2))
+
+
+@compiled(nogil=True)
+def _erase_some(
+    start: int, stop: int, boards: np.ndarray, cells: np.ndarray, worlds: np.ndarray, metrics: np.ndarray,
+    samples: np.ndarray,
+) -> None:  # fmt: skip
+    """Erase the boards from start to stop; the arrays are those of `Whiteboards` and `Worlds`."""
+    for i in range(start, stop):
+        erase(boards[i], cells[i], worlds[i].tick - metrics[i].ticks, metrics[i], samples[i])
 
 
 @compiled

@@ -1,6 +1,6 @@
 """Draw the learning curves of runs of `contactsafe train` into one picture, and say when each had learned its task.
 
-    python tools/learning_curves.py runs/seed0 runs/seed1 runs/seed2 --out docs/learning.png
+    python benchmarks/learning_curves.py runs/seed0 runs/seed1 runs/seed2 --out docs/learning.png
 
 Runs whose folders differ in a number at the end alone, as here, are seeds of one setting and have one colour. Success
 and force are means over the last hundred episodes of training: with exploration, on worlds that differ. Before every

@@ -1,6 +1,6 @@
 """Compare vision encoders: how much of the ink, and the last of it, can be read off the latent of each.
 
-`python docs/vision_encoders.py` prints the table of docs/concepts/vision.md. All see the same held-out boards,
+`python benchmarks/vision_encoders.py` prints the table of docs/concepts/vision.md. All see the same held-out boards,
 and the same small networks read them: one says where the nearest ink lies, one marks the cells of 2 cm about the tool
 that hold ink. What they cannot read, a policy of that size will not learn to use.
 """
@@ -50,7 +50,7 @@ class Boards:
 
 
 def boards(sampler, count, seed):
-    """Draw boards with ink in view."""
+    """Sample boards with ink in view."""
     masks, tools = sampler.sample(count, seed)
     fine = rectify(masks, tools, sampler.homography)
     seen = (fine == 0).any((1, 2))
@@ -79,12 +79,12 @@ def fit(model, inputs, targets, loss):
 
 
 def near(guess, truth):
-    """Give the loss of a guess at the nearest ink."""
+    """Return the loss of a guess at the nearest ink."""
     return functional.smooth_l1_loss(guess, truth / UNIT_M)
 
 
 def marked(guess, truth):
-    """Give the loss of marked cells: ink is rare, and missing it is worse than inventing it."""
+    """Return the loss of marked cells: ink is rare, and missing it is worse than inventing it."""
     return functional.binary_cross_entropy_with_logits(guess, truth, pos_weight=torch.tensor(4.0))
 
 
@@ -100,7 +100,7 @@ def figures(train, test, numbers, test_numbers):
 
 
 def score(test, vectors, guess):
-    """Give (median error, mm; recall; precision) for each amount of ink."""
+    """Return (median error, mm; recall; precision) for each amount of ink."""
     error = 1e3 * np.linalg.norm(vectors - test.nearest, axis=1)
     rows = []
     for low, high in AMOUNTS:
@@ -111,7 +111,7 @@ def score(test, vectors, guess):
 
 
 def vae_numbers(sampler, folder, representation, maps):
-    """Train a β-VAE and give what looks through it, and how many of its numbers move."""
+    """Train a β-VAE and return its `Perception`, and how many of its numbers vary."""
     config = VaeConfig(
         out=Path(folder) / f"{representation}{maps}", representation=representation, images=VAE_PICTURES,
         epochs=VAE_EPOCHS, encoder=replace(EncoderConfig(), maps=maps), probe_steps=0,
