@@ -51,8 +51,8 @@ class WarmTasks(InsertionTasks):
         warm = Observation("temperature", centre=(20.0,), scale=(5.0,), unit="°C")
         return (*super().observation_vectors, warm)
 
-    def finish(self, start, stop):
-        super().finish(start, stop)
+    def finish_step(self, start, stop):
+        super().finish_step(start, stop)
         tasks = self.tasks[start:stop]
         tasks["temperature"][:, 0] = self.config.warmth + 0.01 * tasks["steps"]
 

@@ -49,9 +49,9 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
 def _of_task(task: Task) -> dict[str, Callable[[], object]]:
     """Return the runs that compile all variants of a task, by what follows its name."""
     runs: dict[str, Callable[[], object]] = {"": partial(_do, task.name, task.config())}
-    if task.training:
+    if task.randomised:
         runs[", randomised"] = partial(_do, task.name, task.training_config(True))
-    for package, name, config, engine in task.variants:
+    for package, name, config, engine in task.warmup:
         if importlib.util.find_spec(package):
             runs[name] = partial(_do, task.name, config, engine)
     return runs

@@ -54,11 +54,11 @@ class Variant:
 
     Attributes:
         config: fields of its configuration that differ.
-        training: settings of training that differ, for any algorithm.
+        training_settings: settings of training that differ, for any algorithm.
     """
 
     config: Mapping[str, Any] = field(default_factory=dict)
-    training: Mapping[str, Any] = field(default_factory=dict)
+    training_settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -68,25 +68,25 @@ class Task:
     Attributes:
         simulation: the task's subclass of `Tasks`.
         options: dataclass of the options that `contactsafe evaluate` has for it.
-        training: fields of its configuration while a policy is trained with randomisation.
+        randomised: fields of its configuration that differ while a policy is trained with randomisation.
         training_settings: settings of training that differ from an algorithm's own, by the name of the algorithm.
         as_paper: the task and its training as the paper words them; None where the paper has no such task.
         scripted: scripted policies by name.
         mask_sampler: makes a MaskSampler; None where the task has no camera.
         scenes: makes of its configuration what the paper's experiments ask of it, see `contactsafe.experiments.task`;
             None where there is nothing.
-        variants: what compiles besides, for `contactsafe warmup`: package that it needs, name, configuration, engine.
+        warmup: what compiles besides, for `contactsafe warmup`: package that it needs, name, configuration, engine.
     """
 
     simulation: type[Tasks]
     options: type[TaskOptions] = TaskOptions
-    training: Mapping[str, Any] = field(default_factory=dict)
+    randomised: Mapping[str, Any] = field(default_factory=dict)
     training_settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     as_paper: Variant | None = None
     scripted: Scripted = field(default_factory=lambda: RANDOM)
     mask_sampler: Callable[[], MaskSampler] | None = None
     scenes: Callable[[Any], Any] | None = None
-    variants: tuple[tuple[str, str, TaskConfig, str], ...] = ()
+    warmup: tuple[tuple[str, str, TaskConfig, str], ...] = ()
 
     @property
     def name(self) -> str:
@@ -110,7 +110,7 @@ class Task:
         Raises:
             InvalidInputError: the factor is not 1, and the task's reward has no such weight.
         """
-        config = self._under(conditions, self.training if randomise else {})
+        config = self._under(conditions, self.randomised if randomise else {})
         if gentleness == 1.0:
             return config
         reward: Any = getattr(config, "reward", None)
@@ -123,7 +123,7 @@ class Task:
 
     def settings_of(self, algorithm: str, as_paper: bool = False) -> dict[str, Any]:
         """Return the settings of training that differ from an algorithm's own."""
-        return {**self.training_settings.get(algorithm, {}), **(self._paper().training if as_paper else {})}
+        return {**self.training_settings.get(algorithm, {}), **(self._paper().training_settings if as_paper else {})}
 
     def scripted_policy(self, name: str, config: TaskConfig, env: Any, seed: int) -> Any:
         """Make a scripted policy by name for a vector environment of the task.

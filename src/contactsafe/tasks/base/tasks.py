@@ -137,14 +137,14 @@ class Tasks(Independent):
     def prepare(self) -> None:
         """Make what the task needs beyond worlds and records."""
 
-    def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
+    def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
         """Draw the episode of task i, change its world, and return where its tool starts."""
         raise NotImplementedError
 
-    def begun(self, i: int, rng: np.random.Generator) -> None:
+    def after_reset(self, i: int, rng: np.random.Generator) -> None:
         """Fill the own fields of task i's record; its world has been reset."""
 
-    def finish(self, start: int, stop: int) -> None:
+    def finish_step(self, start: int, stop: int) -> None:
         """Score and observe the step that tasks start to stop have run; compiled, without the GIL."""
         raise NotImplementedError
 
@@ -174,14 +174,14 @@ class Tasks(Independent):
             rng: draws the episode.
             options: some of `reset_options`.
         """
-        q = self.posture_over(self.begin(i, rng, options))
+        q = self.posture_over(self.begin_episode(i, rng, options))
         self.worlds.reset(i, q, self.config.action.stiffness_first)
         if self._pushes is not None:
             self._pushes.begin(i, rng)
         task = self.tasks[i]
         task["steps"], task["success"], task["failed"] = 0, 0, 0
         observe_one(self.worlds.controllers, self.tasks, i)
-        self.begun(i, rng)
+        self.after_reset(i, rng)
 
     def posture_over(self, pose: Pose) -> np.ndarray:
         """Return the joint positions that go with a tool pose, those of the target's posture, (n,), rad.
@@ -220,7 +220,7 @@ class Tasks(Independent):
         def run(start: int, stop: int) -> None:
             act(start, stop, self.worlds.controllers, self._limits, self._rule, self._actions)
             self.worlds.run_some(start, stop, ticks, traces)
-            self.finish(start, stop)
+            self.finish_step(start, stop)
 
         self.worlds.in_threads(run)
 
@@ -286,7 +286,7 @@ class Tasks(Independent):
             )
         return config or kind()
 
-    def sort(self) -> tuple[Any, ...]:
+    def compile_key(self) -> tuple[Any, ...]:
         """Return what decides which code a step compiles."""
         return (type(self), self.arm.n)
 
@@ -301,10 +301,10 @@ _WARM: set[tuple[Any, ...]] = set()
 
 def _warm_up(tasks: Tasks) -> None:
     """Run a step of a task of our own: the first step in a process compiles or loads for a long time."""
-    sort = tasks.sort()
-    if sort in _WARM:
+    key = tasks.compile_key()
+    if key in _WARM:
         return
-    _WARM.add(sort)
+    _WARM.add(key)
     scratch = tasks.scratch()
     scratch.reset(0, np.random.default_rng(0))
     scratch.step(np.zeros((1, ACTION_SIZE)))

@@ -83,7 +83,7 @@ class InsertionTasks(Tasks):
             self._parameters[name] = getattr(config.reward, name)
         self._parameters["depth_m"] = config.depth_m
 
-    def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
+    def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
         """Draw where the hole truly is and how slippery it is; the tool starts above where it is believed to be."""
         config, task = self.config, self.tasks[i]
         believed = np.array(config.mouth)
@@ -96,11 +96,11 @@ class InsertionTasks(Tasks):
         height = finite_array(options.get("height", rng.uniform(*config.start_m)), (), "height")
         return Pose(believed + np.array([0.0, 0.0, float(height)]), DOWN)
 
-    def begun(self, i: int, rng: np.random.Generator) -> None:
+    def after_reset(self, i: int, rng: np.random.Generator) -> None:
         """Measure and observe for the first time."""
         begin(self.worlds.records, self.worlds.controllers, self.tasks, i)
 
-    def finish(self, start: int, stop: int) -> None:
+    def finish_step(self, start: int, stop: int) -> None:
         """Score and observe, in the worlds from start to stop."""
         worlds = self.worlds
         finish(start, stop, worlds.records, worlds.controllers, worlds.metrics, self._parameters[0], self.tasks)

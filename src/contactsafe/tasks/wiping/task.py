@@ -42,7 +42,7 @@ class WipingOptions(TaskOptions):
 
 AS_PAPER = Variant(
     config={"reward": RewardConfig.as_paper()},
-    training={
+    training_settings={
         "encoder": Path("runs/vae_paper"),
         "controller": "vices",
         "observes": ("pose",),
@@ -55,12 +55,12 @@ AS_PAPER = Variant(
 TASK = Task(
     WipingTasks,
     WipingOptions,
-    training={"randomisation": Randomisation.broad()},
+    randomised={"randomisation": Randomisation.broad()},
     as_paper=AS_PAPER,
     scripted=SCRIPTED,
     mask_sampler=MaskSampler,
     scenes=Wiping,
-    variants=(
+    warmup=(
         ("cv2", ", photographs", WipingConfig(image_source="photograph"), "mujoco"),
         ("pybullet", " in PyBullet", WipingConfig(), "pybullet"),
     ),

@@ -97,7 +97,7 @@ class WipingTasks(Tasks):
 
         return PhotographSource(self.worlds, self.boards)
 
-    def begin(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
+    def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
         """Paint board i and draw the tool's start."""
         config, board = self.config, self.boards.boards[i]
         board.clear()
@@ -113,7 +113,7 @@ class WipingTasks(Tasks):
             self._variation.draw(i, rng)
         return Pose(np.asarray(start, dtype=float), DOWN)
 
-    def begun(self, i: int, rng: np.random.Generator) -> None:
+    def after_reset(self, i: int, rng: np.random.Generator) -> None:
         """Count the ink and look at the board for the first time."""
         boards, task = self.boards, self.tasks[i]
         boards.enter_ink(i)
@@ -142,7 +142,7 @@ class WipingTasks(Tasks):
         """Take in what was drawn on the boards since the last step."""
         self.boards.enter_changed()
 
-    def finish(self, start: int, stop: int) -> None:
+    def finish_step(self, start: int, stop: int) -> None:
         """Erase, score and look, in the worlds from start to stop."""
         worlds, boards = self.worlds, self.boards
         boards.erase(start, stop, worlds)
@@ -183,9 +183,9 @@ class WipingTasks(Tasks):
         """Return mask i as an image, uint8 (512, 512, 3)."""
         return np.kron(self.boards.masks[i], np.ones((4, 4), np.uint8))[..., None].repeat(3, axis=-1)
 
-    def sort(self) -> tuple[Any, ...]:
+    def compile_key(self) -> tuple[Any, ...]:
         """Return what decides which code a step compiles."""
-        return (*super().sort(), self.config.image_source, self.config.randomisation is not None)
+        return (*super().compile_key(), self.config.image_source, self.config.randomisation is not None)
 
     def scratch(self) -> "WipingTasks":
         """Make one task alike to warm up with; its board needs no fonts."""
