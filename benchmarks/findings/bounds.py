@@ -9,6 +9,7 @@ from benchmarks.findings.printing import say
 from benchmarks.findings.scenes import PUSH_N, Loop
 
 import contactsafe as cs
+from contactsafe.control import presets
 from contactsafe.control.laws import stiffness_wrench
 from contactsafe.experiments.adversarial import run_adversarial
 
@@ -46,10 +47,8 @@ def force_and_energy() -> None:
     ]
     say(f"a target 10 m away, K1 1500 1/s²: a force of {forces[0]:.0f} N; bounded {forces[1]:.0f} N")
     tank = {"tank_j": SAFE.limits.tank_j, "tank_power_w": SAFE.limits.tank_power_w}
-    bounded = {
-        name: getattr(SAFE, name)
-        for name in ("task_acceleration_max_m_s2", "task_acceleration_max_rad_s2", "posture_error_max_rad")
-    }
+    accelerations = ("task_acceleration_max_m_s2", "task_acceleration_max_rad_s2")
+    bounded = {name: presets.SAFE[name][0] for name in (*accelerations, "posture_error_max_rad")}
     laws = {"paper": PAPER, "+ tank": PAPER.with_(**tank), "+ bounded force": PAPER.with_(**bounded), "safe": SAFE}
     for name, config in laws.items():
         found = run_adversarial(ARM, config, range(8), 5000)

@@ -33,6 +33,18 @@ def test_figures_are_what_the_program_prints(number, capsys):
     assert_prints("".join(f"{line.strip()}\n" for line in printed), QUOTED[number])
 
 
+@pytest.mark.parametrize("number", sorted(QUOTED, key=int))
+def test_every_finding_runs_and_prints_what_the_page_quotes_but_for_its_figures(number, capsys):
+    assert main([number]) == 0
+    printed = capsys.readouterr().out.splitlines()[1:]
+    assert without_figures("\n".join(printed)) == without_figures(QUOTED[number])
+
+
+def without_figures(text):
+    """Return what is printed with its figures left out; how wide they are moves the spaces."""
+    return re.sub(r"[-+\d.e]+", "#", re.sub(r"\s+", "", text))
+
+
 def test_an_unknown_finding_is_refused(capsys):
     assert main(["9"]) == 2
     assert "give numbers out of 1, 2, " in capsys.readouterr().err
