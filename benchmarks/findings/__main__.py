@@ -51,7 +51,8 @@ def main(arguments: Sequence[str] = ()) -> int:
         print(f"findings: give numbers out of {', '.join(map(str, FINDINGS))}, or none for all", file=sys.stderr)
         return 2
     for number, measure in chosen.items():
-        print(f"{number}. {(measure.__doc__ or '').strip()}", flush=True)
+        if len(chosen) > 1:
+            print(f"{number}. {(measure.__doc__ or '').strip()}", flush=True)
         measure()
     return 0
 

@@ -7,7 +7,7 @@ import numpy as np
 
 def say(text: str) -> None:
     """Print one line of a finding."""
-    print("   ", text, flush=True)
+    print(text.rstrip(), flush=True)
 
 
 def spreads(values: Sequence[float], unit: str) -> str:

@@ -14,6 +14,7 @@ QUOTED = dict(
     re.findall(r"^python -m benchmarks\.findings (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 )
 WITHOUT_FIGURES = {"9"}
+ALIKE_EVERYWHERE = {"2", "10"}  # no motion that another processor would change
 
 
 def test_every_finding_of_the_page_has_a_function_and_a_figure():
@@ -26,18 +27,13 @@ def test_the_table_lists_them_all():
     assert set(re.findall(r"^\| \[(\d+)\]\(#", PAGE, re.MULTILINE)) == set(QUOTED)
 
 
-@pytest.mark.parametrize("number", ["2", "10"])
-def test_figures_are_what_the_program_prints(number, capsys):
-    assert main([number]) == 0
-    printed = capsys.readouterr().out.splitlines()[1:]
-    assert_prints("".join(f"{line.strip()}\n" for line in printed), QUOTED[number])
-
-
 @pytest.mark.parametrize("number", sorted(QUOTED, key=int))
 def test_every_finding_runs_and_prints_what_the_page_quotes_but_for_its_figures(number, capsys):
     assert main([number]) == 0
-    printed = capsys.readouterr().out.splitlines()[1:]
-    assert without_figures("\n".join(printed)) == without_figures(QUOTED[number])
+    printed = capsys.readouterr().out
+    assert without_figures(printed) == without_figures(QUOTED[number])
+    if number in ALIKE_EVERYWHERE:
+        assert_prints(printed, QUOTED[number])
 
 
 def without_figures(text):
