@@ -1,5 +1,7 @@
 """An action moves the target by what the configuration says, and never out of bounds; 17, 17, 16 ticks at a time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -10,6 +12,7 @@ from contactsafe.policy.action import DOWN, rotation_from_down
 from contactsafe.policy.action_config import ACTION_SIZE, ACTIONS, GAINS, ActionConfig, action_limits, learned_actions
 from contactsafe.robot.arm import Pose
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
@@ -142,6 +145,14 @@ def test_constant_gains_stay_whatever_is_asked_and_are_critical(gains):
         assert_allclose(target["K_task"], CONSTANT[gains], rtol=1e-15)
         assert_allclose(target["D_task"], 2.0 * np.sqrt(CONSTANT[gains]), rtol=1e-15)
         act(made, slice(6, 18), value, steps=3)
+
+
+@pytest.mark.parametrize("gains", ["low", "middle", "high"])
+def test_constant_damping_is_none_that_a_policy_could_not_choose(gains):
+    config = replace(InsertionConfig.action, gains=gains)
+    limits = action_limits(config, (0.0, 0.0, 0.0))
+    assert_array_equal(limits.D_low, limits.D_high)
+    assert_array_equal(limits.D_low, np.clip(2.0 * np.sqrt(limits.K_low), config.damping_low, config.damping_high))
 
 
 def test_learned_gains_have_the_range_and_the_start_that_are_configured():

@@ -69,7 +69,7 @@ def export_bundle(
     """
     folder = Path(folder)
     if folder.exists() and not force:
-        raise OutputError(f"{folder} exists; give --force to replace it, or another folder")
+        raise OutputError(f"{folder} exists; pass force=True to replace it, or give another folder")
     if folder.exists() and any(folder.iterdir()) and not (folder / MANIFEST).is_file():
         raise OutputError(f"{folder} is no bundle and will not be replaced; give another folder")
     policy = _export_policy(layers, scaling, description)

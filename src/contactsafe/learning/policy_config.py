@@ -46,14 +46,16 @@ class PolicyConfig:
         out: folder of the run: checkpoint, TensorBoard log, and at its end a bundle.
         resume: go on from the checkpoint in out, as if the run had never stopped.
         task: what is learned; from Python, any name for the environments that are handed over.
-        as_paper: configure task and training as the paper words them: free-space controller, pose and latent alone, its
-            reward; takes an encoder of `contactsafe train vae --representation paper`.
+        as_paper: configure the task as the paper words it, which has another reward. `for_task`, and so the command
+            line, then trains as the paper does too: free-space controller, pose and latent alone, with an encoder of
+            `contactsafe train vae --representation paper`.
         controller: preset underneath, as it is or with other values of parameters: `safe:tool_force_limit_n=12`.
         gains: who sets K1 and D1: the policy (learned), or nobody: K1 stays at the low end, in the middle or at the
-            high end of its range, D1 critical, and the policy has six actions in place of eighteen.
+            high end of its range, D1 is critical or the nearest that its range allows, and the policy has six actions
+            in place of eighteen.
         gentleness: what the reward takes for force is multiplied by this; 0 for a reward that does not ask for
             gentle contacts.
-        randomise: train on worlds that differ from episode to episode; held-out episodes are of the nominal one.
+        randomise: train on worlds that differ more than those of held-out episodes do, where the task has such.
         num_envs: environments side by side.
         total_steps: steps of the policy, over all environments and sessions.
         max_minutes: stop after this long in this session, keep a checkpoint and export what there is; 0 for no limit.
@@ -68,7 +70,7 @@ class PolicyConfig:
         reward_scale: rewards are multiplied by this before learning; logs are not.
         observes: vectors that the policy takes besides images, such as pose (the paper's), target (x_d, K1 and D1 as
             they are now) and force, each after a space; none for all that the task offers.
-        rate_hz: of environment steps.
+        rate_hz: of environment steps; for environments of one's own that are handed over.
         evaluate_episodes: held-out ones, at the end; 0 for none.
         seed: of weights, exploration and episodes.
         threads: torch's. More than one crawls as soon as anything else wants a core.
@@ -98,7 +100,7 @@ class PolicyConfig:
     dither: float = 0.3
     reward_scale: float = 1.0
     observes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
-    rate_hz: float = 60.0
+    rate_hz: tyro.conf.Suppress[float] = 60.0
     evaluate_episodes: int = 64
     seed: int = 0
     threads: int = 1

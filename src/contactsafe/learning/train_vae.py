@@ -27,7 +27,7 @@ from contactsafe.vision.rectify import WINDOW_M
 _MAY_DIFFER = ("out", "resume", "threads", "held_out", "probe_steps")
 """Settings that may change when a run goes on."""
 
-HELD_OUT_SEED = 1_000_003
+HELD_OUT_MASKS_SEED = 1_000_003
 """Added to the seed for masks that are never trained on."""
 
 
@@ -105,7 +105,7 @@ def _train(config: VaeConfig, sample_masks: SampleMasks, homography: np.ndarray,
     first_epoch = _go_on(config, vae, optimiser, out) if config.resume else 0
     view = (config.representation, config.window_m, config.encoder.size)
     data = make_dataset(sample_masks, homography, config.images, config.seed, *view)
-    held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_SEED, *view)
+    held_out = make_dataset(sample_masks, homography, config.held_out, config.seed + HELD_OUT_MASKS_SEED, *view)
 
     with contextlib.closing(EventFile(out)) as log:
         for epoch in range(first_epoch, config.epochs):

@@ -50,7 +50,8 @@ class ActionConfig:
         stiffness_low, stiffness_high: range of K1, 1/s².
         damping_low, damping_high: range of D1, 1/s.
         stiffness_start: K1 at the start of an episode, 1/s²; D1 starts critical.
-        gains: one of `GAINS`; where not learned, the last twelve actions do nothing, K1 is constant and D1 critical.
+        gains: one of `GAINS`; where not learned, the last twelve actions do nothing, K1 is constant, and D1 is as near
+            to critical damping as its range allows.
     """
 
     translation: tuple[float, float, float] = (0.0067, 0.0067, 0.002)
@@ -115,7 +116,7 @@ def action_limits(config: ActionConfig, centre: tuple[float, float, float]) -> A
     K_low, K_high = config.stiffness_range
     D_low, D_high = np.array(config.damping_low), np.array(config.damping_high)
     if config.gains != LEARNED_GAINS:
-        D_low = D_high = 2.0 * np.sqrt(K_low)
+        D_low = D_high = np.clip(2.0 * np.sqrt(K_low), D_low, D_high)
     return ActionLimits(
         step=np.array([*config.translation, *config.rotation, *config.stiffness, *config.damping]),
         low=np.array([x - reach, y - reach, z - config.press, -tilt, -tilt, -tilt]),

@@ -1,7 +1,7 @@
 """A policy as it is shipped: a folder with its ONNX models and a page of JSON that describes and seals them.
 
 Nothing here unpickles or runs what it reads: files are bounded in size, compared with their SHA-256, read whole and
-checked (`policy.graph`), and handed to ONNX Runtime as bytes. The digests guard against damage and mix-ups; they are
+checked (`onnx_graph`), and handed to ONNX Runtime as bytes. The digests guard against damage and mix-ups; they are
 no signature.
 """
 
@@ -64,7 +64,7 @@ class Bundle(Independent):
 
         Raises:
             BundleError: a file is missing, too large, unreadable, a link to elsewhere, damaged or not what bundle.json
-                says; the format is another; a model has other inputs and outputs, or more than `policy.graph` allows.
+                says; the format is another; a model has other inputs and outputs, or more than `onnx_graph` allows.
         """
         folder = Path(folder)
         try:

@@ -46,7 +46,7 @@ class Observation:
 
 
 def target_observation(config: ActionConfig) -> Observation:
-    """Return how policies observe the target: offset of x_d from the tool, K1 and D1, scaled by what actions reach."""
+    """Return how policies observe the target: x_d less the pose, K1 and D1, the gains scaled by their ranges."""
     low, high = (
         np.array([*stiffness, *damping])
         for stiffness, damping in (

@@ -48,7 +48,7 @@ def open_session(model: bytes | Graph, name: str, threads: int = 1) -> onnxrunti
         threads: for one operator; 1 keeps clear of the control loop's core.
 
     Raises:
-        BundleError: the bytes are no ONNX model, or one with more than `policy.graph` allows.
+        BundleError: the bytes are no ONNX model, or one with more than `policy.onnx_graph` allows.
     """
     graph = model if isinstance(model, Graph) else read_graph(model, name)
     options = onnxruntime.SessionOptions()
