@@ -16,13 +16,13 @@ TEXTS = {path: path.read_text(encoding="utf-8") for path in SOURCES if path.suff
 
 INSTEAD = {
     "detection, isolation, identification, classification": "locating judging",
-    "impact; peak regression; larger force": "blow blows harder",
+    "impact; peak regression; larger force; acceptance criteria": "blow blows harder bars",
     "identify, estimate (a mass)": "weigh weighs weighed weighing unweighed",
     "surface": "skin",
     "push; contact kind; mode": "pusher pushers is_pushed holding pusher_stiffness",
     "contact_force_limit_...": "push_yield_n push_hold_n push_meet_n meet_s",
     "K_posture, D_posture, q_posture": "K_pose D_pose q_pose",
-    "gain, scale, fraction, chunk": "trigger_gain share shares",
+    "gain, scale, fraction, chunk": "trigger_gain observer_gain share shares",
     "displacement, path, direction; task force": "way ways pull pulls pulled pulling",
     "separate_tool_wrench, line_of_action_misses_tool": "part_tool_from_arm passes_elsewhere",
     "predict_velocity, horizon": "coming_speed ahead",
@@ -30,6 +30,8 @@ INSTEAD = {
     "robot description": "facts",
     "vision encoder, log-polar features, image source": "eyes foveated sight retina",
     "ink index": "ledger",
+    "state_dict, load_state_dict": "snapshot snapshots",
+    "scripted policies, random policy, dither; target": "chance scan",
     "adversarial, corrupt, perturbed": "hostile spoil spoils spoiled spoiling knocked",
 }
 """What to say, and what not, as whole words."""

@@ -41,17 +41,17 @@ def _head(experiments: Sequence[Experiment], count: str) -> dict[str, str]:
     policies = dict.fromkeys(experiment.policy for experiment in experiments if experiment.policy)
     if policies:
         what, headline = "one policy", f"One learned policy, {count}, and contacts nobody planned"
-        lead = (
+        introduction = (
             f"{escape(' '.join(policies))} It runs unchanged on each of the controllers below; this page shows the "
             "contact forces they allow: on what the tool works on, and on what the rest of the arm runs into."
         )
     else:
         what, headline = "unplanned contacts", f"{count.capitalize()}, and contacts nobody planned"
-        lead = (
+        introduction = (
             "A simulated arm moves its tool by a script, the same for each of the controllers below; this page shows "
             "what happens when something touches the arm."
         )
-    return {"title": f"contactsafe: {count}, {what}", "headline": headline, "lead": lead}
+    return {"title": f"contactsafe: {count}, {what}", "headline": headline, "introduction": introduction}
 
 
 def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter) -> str:

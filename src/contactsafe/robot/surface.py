@@ -80,8 +80,8 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
 def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> np.ndarray:
     """Find where random lines first meet some geoms: points and outward normals in world axes, (H, 6).
 
-    Lines between random points of a sphere come from everywhere alike: they meet all of a convex surface with the same
-    chance per area (Crofton), and never first what lies within another geom. `model` loses its geoms' groups.
+    Lines between random points of a sphere come from everywhere alike: they meet all of a convex surface equally
+    often per area (Crofton), and never first what lies within another geom. `model` loses its geoms' groups.
     """
     if not geoms.size:
         return np.zeros((0, 6))

@@ -62,14 +62,14 @@ class SpiralSearch(Independent):
 
     def act(self, observation: dict[str, np.ndarray]) -> np.ndarray:
         """Choose the actions, (N, 18)."""
-        offset, lead = observation["offset"][:, :3], observation["target"][:, :3]
+        offset, target = observation["offset"][:, :3], observation["target"][:, :3]
         force = observation["wrench"][:, 2]
         actions = np.zeros((len(offset), ACTION_SIZE), np.float32)
         for i in range(len(offset)):
             self._landed[i] |= force[i] > _TOUCH_N
             inside = offset[i, 2] < -_INSIDE_M
             tool = offset[i, :2]
-            step = -lead[i, :2] if inside else _CATCH_UP * (self._spiral(i, tool) - tool)
+            step = -target[i, :2] if inside else _CATCH_UP * (self._spiral(i, tool) - tool)
             actions[i, :2] = step / self._step[:2]
             actions[i, 6:8] = 1.0  # as stiff sideways as actions go
             actions[i, 2] = self._down(i, inside, force[i]) / self._step[2]
