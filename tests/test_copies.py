@@ -122,7 +122,7 @@ def step_envs(envs):
 
 
 def vary(variation):
-    variation.draw(0, np.random.default_rng(abs(int(1e9 * variation.drawn["payload_kg"][0]))))
+    variation.sample(0, np.random.default_rng(abs(int(1e9 * variation.sampled["payload_kg"][0]))))
     variation.look_first(0)
     return [variation._worlds.models[0].body_mass.copy(), variation._boards.masks.copy()]
 

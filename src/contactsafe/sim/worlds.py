@@ -87,7 +87,7 @@ class Worlds(Independent):
         world: plant, sensors, fixtures, obstacles; one for all, or one for each.
         controller: a preset or another configuration, the same for all.
         n: how many.
-        seed: of the sensors' noise and bias; world i draws from its own stream. One for all, or one for each: then
+        seed: of the sensors' noise and bias; world i samples from its own stream. One for all, or one for each: then
             what a world does depends on nothing but its own.
         shared: whether equal configurations use one model; false where models change from episode to episode.
         backend: what computes the physics in place of MuJoCo: `backend(arm, config, tick_s)` makes one for each world.
@@ -222,7 +222,7 @@ class Worlds(Independent):
             backend.close()
 
     def sample_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Draw the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
+        """Sample the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
         for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
             rng.standard_normal(out=noise)
         return self._noise

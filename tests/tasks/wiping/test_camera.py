@@ -106,7 +106,7 @@ def test_the_arm_hides_ink(scene):
     """All ink behind the pad and the hand is out of view; all the rest stays."""
     board = scene.board
     board.clear()
-    board.draw(np.ones((1, 1)))
+    board.paint(np.ones((1, 1)))
     scene.place(posture(AWAY))
     free = scene.mask().copy() == 0
     scene.place(posture((0.5, 0.0, BOARD_Z)))
@@ -131,7 +131,7 @@ BOARDS = {
     "strokes": lambda board: board.sample_random(np.random.default_rng(1)),
     "other strokes": lambda board: board.sample_random(np.random.default_rng(7)),
     "nearly clean": nearly_clean,
-    "covered": lambda board: board.draw(np.ones((1, 1))),
+    "covered": lambda board: board.paint(np.ones((1, 1))),
 }
 POSES = {
     "pressing": ((0.5, 0.0, BOARD_Z - 0.001), (0.0, 0.0, 0.0)),
@@ -164,7 +164,7 @@ def test_specks_of_ink_are_not_lost_nor_invented(scene):
     from tests.tasks.wiping.inked_scene import Renderings
 
     scene.board.clear()
-    scene.board.draw(np.random.default_rng(2).uniform(size=(50, 50)) < 0.02)
+    scene.board.paint(np.random.default_rng(2).uniform(size=(50, 50)) < 0.02)
     q = posture(AWAY)
     scene.place(q)
     with Renderings(furnish(WorldConfig(), BOARD), scene.board, CAMERA) as renderings:

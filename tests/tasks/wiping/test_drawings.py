@@ -60,7 +60,7 @@ def test_lines_are_as_wide_as_a_pen(kind):
 
 def test_a_drawing_replaces_what_was_there():
     board = Whiteboard(CONFIG)
-    board.draw(np.ones((1, 1)))
+    board.paint(np.ones((1, 1)))
     paint_board(board, "digits", np.random.default_rng(0))
     assert_array_equal(board.cells == INK, drawn("digits", 0))
 

@@ -119,7 +119,7 @@ def test_another_camera_is_noticed_without_a_look():
     boards, first = tasks.boards, int(tasks.boards.records[0]["camera"])
     seed = 0
     while boards.records[0]["camera"] == first:
-        tasks._variation.draw(0, np.random.default_rng(seed := seed + 1))
+        tasks._variation.sample(0, np.random.default_rng(seed := seed + 1))
     tasks.worlds.reset(0, tasks.worlds.records[0]["errors"]["q_seen"])
     wiping(tasks, 30)
     assert_array_equal(boards.masks, whole_masks(tasks))

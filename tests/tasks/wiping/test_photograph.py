@@ -113,7 +113,7 @@ def test_a_dark_object_is_taken_for_ink(studio):
 
 def test_what_kinematics_hide_is_what_the_mask_hides(studio):
     """The outline's pixels against those whose ink the mask's line-of-sight test removes."""
-    studio.board.draw(np.ones((1, 1)))
+    studio.board.paint(np.ones((1, 1)))
     studio.place(AWAY)
     free = studio.scene.mask() == 0
     for position in ((0.5, 0.0, 0.01), (0.42, 0.12, 0.04), (0.63, -0.1, 0.09)):

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import contactsafe  # noqa: F401  (registers the task)
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.randomisation import Randomisation, draw
+from contactsafe.tasks.wiping.randomisation import Randomisation, sample
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
 BROAD = WipingConfig(randomisation=Randomisation.broad(), episode_s=0.5)
@@ -32,7 +32,7 @@ def pressed(tasks, steps=60):
 
 def test_draws_stay_in_their_ranges():
     ranges, rng = Randomisation.broad(), np.random.default_rng(0)
-    drawn = [draw(ranges, 16, rng) for _ in range(200)]
+    drawn = [sample(ranges, 16, rng) for _ in range(200)]
     for name in ("board_height_m", "friction", "pad_size", "payload_kg", "delay_steps", "ink_missed"):
         low, high = getattr(ranges, name)
         values = np.array([one[name] for one in drawn])
@@ -74,7 +74,7 @@ def test_a_late_picture_is_the_one_of_so_many_steps_ago():
     board, shown = tasks.boards.boards[0], []
     board.clear()
     tasks.observe(0)
-    board.draw(np.ones((3, 3)))
+    board.paint(np.ones((3, 3)))
     for _ in range(4):
         tasks.step(np.zeros((1, 18)))
         shown.append(bool((tasks.boards.masks[0] == 0).any()))

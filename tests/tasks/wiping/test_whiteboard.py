@@ -84,7 +84,7 @@ def test_an_object_half_off_the_board_is_cut(board):
 
 
 def test_a_drawing_is_scaled_to_the_area_with_row_0_nearest_the_robot(board):
-    board.draw(np.array([[1, 0], [0, 0]]))
+    board.paint(np.array([[1, 0], [0, 0]]))
     inked = centres(board)[board.cells == INK]
     side = CONFIG.ink_size / 2
     assert board.ink_cells == (side / CONFIG.cell) ** 2
@@ -96,13 +96,13 @@ def test_a_drawing_of_any_fineness_keeps_its_fraction_of_ink(board):
     rng = np.random.default_rng(0)
     for n in (1, 3, 150, 1000):
         drawing = rng.uniform(size=(n, n)) < 0.4 if n > 1 else np.ones((1, 1))
-        board.draw(drawing)
+        board.paint(drawing)
         assert board.ink_cells / 150**2 == pytest.approx(drawing.mean(), abs=0.02)
 
 
 def test_drawing_anew_replaces_the_ink_and_clear_removes_everything(board):
-    board.draw(np.ones((4, 4)))
-    board.draw(np.zeros((4, 4)))
+    board.paint(np.ones((4, 4)))
+    board.paint(np.zeros((4, 4)))
     assert board.ink_cells == 0
     board.place_object((0.5, 0.2), (0.02, 0.02))
     board.clear()
@@ -112,7 +112,7 @@ def test_drawing_anew_replaces_the_ink_and_clear_removes_everything(board):
 @pytest.mark.parametrize("shape", [(3, 4), (4,), (0, 0), (2, 2, 3)])
 def test_drawings_that_are_not_square_are_refused(board, shape):
     with pytest.raises(InvalidInputError) as caught:
-        board.draw(np.ones(shape))
+        board.paint(np.ones(shape))
     assert str(caught.value) == f"drawing has shape {shape}; give a square image, (n, n), true where ink is"
 
 
@@ -141,7 +141,7 @@ def test_random_drawings_are_their_seeds(board):
 def test_nothing_is_erased_without_press():
     """A pad that slides over the ink a millimetre above it leaves it all."""
     scene = scene_at((0.5, 0.0, BOARD_Z + 0.002))
-    scene.board.draw(np.ones((1, 1)))
+    scene.board.paint(np.ones((1, 1)))
     ink = scene.boards.ink_cells()[0]
     aim(scene.worlds, (0.5, 0.05, BOARD_Z + 0.002))
     trace = scene.wipe(600)
@@ -153,7 +153,7 @@ def test_nothing_is_erased_without_press():
 def test_a_pressed_pad_leaves_a_clean_track():
     scene = scene_at((0.5, 0.0, BOARD_Z + 0.002), CALM)
     board = scene.board
-    board.draw(np.ones((1, 1)))
+    board.paint(np.ones((1, 1)))
     ink = scene.boards.ink_cells()[0]
     aim(scene.worlds, (0.5, 0.08, BOARD_Z - 0.008))
     trace = scene.wipe(1500)

@@ -16,7 +16,7 @@ Begin = Callable[[Any, int, np.random.Generator], None]
 
 
 def held_out(seed: int) -> np.random.Generator:
-    """Return the generator of an episode: none that training has drawn from."""
+    """Return the generator of an episode: none that training has sampled from."""
     return np.random.default_rng(HELD_OUT_SEED + seed)
 
 
@@ -27,7 +27,7 @@ class TaskEpisodes(Independent):
         tasks: that run them.
         seeds: of the episodes.
         begin: begins one of them; `Tasks.reset` where None.
-        rngs: of the episodes; what was drawn from them before is not drawn again.
+        rngs: of the episodes; what was sampled from them before is not sampled again.
     """
 
     def __init__(

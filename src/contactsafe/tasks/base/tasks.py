@@ -36,7 +36,7 @@ class Tasks(Independent):
     Args:
         config: of the task; None for its defaults.
         n: how many.
-        seed: of the sensors' noise; what an episode draws comes from the generator given to `reset`.
+        seed: of the sensors' noise; what an episode samples comes from the generator given to `reset`.
         worlds: one configuration for each task in place of `config.world`, such as obstacles of its own.
         arm: that works; None for the task's own.
         backend: what computes the physics in place of MuJoCo; see `contactsafe.sim.backend`.
@@ -138,7 +138,7 @@ class Tasks(Independent):
         """Make what the task needs beyond worlds and records."""
 
     def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
-        """Draw the episode of task i, change its world, and return where its tool starts."""
+        """Sample the episode of task i, change its world, and return where its tool starts."""
         raise NotImplementedError
 
     def after_reset(self, i: int, rng: np.random.Generator) -> None:
@@ -171,7 +171,7 @@ class Tasks(Independent):
 
         Args:
             i: which task.
-            rng: draws the episode.
+            rng: samples the episode.
             options: some of `reset_options`.
         """
         q = self.posture_over(self.begin_episode(i, rng, options))

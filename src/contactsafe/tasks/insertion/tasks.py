@@ -84,7 +84,7 @@ class InsertionTasks(Tasks):
         self._parameters["depth_m"] = config.depth_m
 
     def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
-        """Draw where the hole truly is and how slippery it is; the tool starts above where it is believed to be."""
+        """Sample where the hole truly is and how slippery it is; the tool starts above where it is believed to be."""
         config, task = self.config, self.tasks[i]
         believed = np.array(config.mouth)
         error = np.array([*rng.uniform(-config.error_m, config.error_m, 2), 0.0])

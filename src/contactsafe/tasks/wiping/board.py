@@ -17,7 +17,7 @@ class BoardConfig:
     Attributes:
         centre: of its upper face, world, m.
         size: along x and y, m.
-        ink_size: edge of the square in its middle that may be drawn on, m.
+        ink_size: edge of the square in its middle that may be painted on, m.
         cell: edge of one ink cell, m.
         friction: Coulomb coefficient of pad on board.
         press_n: force with which the pad must be pressed to erase, N.

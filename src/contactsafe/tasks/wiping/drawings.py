@@ -41,7 +41,7 @@ def paint_board(board: Whiteboard, kind: str, rng: np.random.Generator) -> None:
     if kind == "strokes":
         board.sample_random(rng)
     else:
-        board.draw(_written(_page(kind, rng), board.config.ink_size, board.config.cell, rng))
+        board.paint(_written(_page(kind, rng), board.config.ink_size, board.config.cell, rng))
 
 
 def _page(kind: str, rng: np.random.Generator) -> np.ndarray:

@@ -81,10 +81,10 @@ class Conditions:
 
 
 def sample_conditions(rng: np.random.Generator, severity: float | None = None) -> Conditions:
-    """Draw the conditions of an episode.
+    """Sample the conditions of an episode.
 
     Args:
-        rng: draws them.
+        rng: samples them.
         severity: from 0, an evenly lit board, to 1, a lamp on one side and sharp shadows; sampled where None.
     """
     s = rng.uniform() if severity is None else severity

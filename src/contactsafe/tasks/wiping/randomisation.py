@@ -1,6 +1,6 @@
 """What differs from episode to episode: height and tilt of the table, pad, camera, plant.
 
-A policy that has met all of this carries over to a robot that nobody tuned for it. What is drawn goes into the plant
+A policy that has met all of this carries over to a robot that nobody tuned for it. What is sampled goes into the plant
 and into what the camera sees; controller and policy are never told.
 """
 
@@ -15,7 +15,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Randomisation:
-    """Ranges, both ends included, that each episode draws from evenly; the defaults change nothing.
+    """Ranges, both ends included, that each episode samples evenly; the defaults change nothing.
 
     Attributes:
         board_height_m: of the board above where it is believed to be, m.
@@ -96,7 +96,7 @@ POSSIBLE = {
     "torque_delay_ticks": (0, 1),
 }
 
-draw_dtype = np.dtype(
+sampled_dtype = np.dtype(
     [
         ("board_height_m", float),
         ("board_tilt_rad", float, (2,)),
@@ -115,13 +115,13 @@ draw_dtype = np.dtype(
 """What one episode drew."""
 
 
-def draw(config: Randomisation, cameras: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw one episode's world, a `draw_dtype` record, (); `cameras` is how many stand ready."""
-    drawn = np.zeros((), dtype=draw_dtype)
-    for name in draw_dtype.names or ():
+def sample(config: Randomisation, cameras: int, rng: np.random.Generator) -> np.ndarray:
+    """Sample one episode's world, a `sampled_dtype` record, (); `cameras` is how many stand ready."""
+    sampled = np.zeros((), dtype=sampled_dtype)
+    for name in sampled_dtype.names or ():
         low, high = (0, cameras - 1) if name == "camera" else getattr(config, name)
-        whole = draw_dtype[name].base.kind == "i"
-        drawn[name] = (
-            rng.integers(low, high, endpoint=True) if whole else rng.uniform(low, high, draw_dtype[name].shape)
+        whole = sampled_dtype[name].base.kind == "i"
+        sampled[name] = (
+            rng.integers(low, high, endpoint=True) if whole else rng.uniform(low, high, sampled_dtype[name].shape)
         )
-    return drawn
+    return sampled

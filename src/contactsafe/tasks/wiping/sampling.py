@@ -13,11 +13,11 @@ from contactsafe.tasks.wiping.whiteboard import INK, erase_under_pad
 
 _RAISED = 0.35  # m above the board: the arm is out of the camera's view of it
 _FRACTION_RAISED = 0.1
-_FRACTION_BLANK = 0.2  # of the boards that were wiped clean: the rest are drawn anew
+_FRACTION_BLANK = 0.2  # of the boards that were wiped clean: the rest are painted anew
 
 
 class MaskSampler(Independent):
-    """Draw masks such as a wiping episode shows, without running one.
+    """Sample masks such as a wiping episode shows, without running one.
 
     Args:
         config: of the task.
@@ -31,7 +31,7 @@ class MaskSampler(Independent):
         self.homography = self._tasks.boards.homography
 
     def sample(self, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """Draw masks.
+        """Sample masks.
 
         Args:
             n: how many.
@@ -58,7 +58,7 @@ class MaskSampler(Independent):
         return tool
 
     def _paint_board(self, rng: np.random.Generator) -> None:
-        """Draw and wipe until there is something to see, mostly."""
+        """Paint and wipe until there is something to see, mostly."""
         board = self._tasks.boards.boards[0]
         while True:
             board.clear()

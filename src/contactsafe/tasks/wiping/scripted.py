@@ -70,7 +70,7 @@ class _Script(Independent):
 
 
 class Raster(_Script):
-    """Wipe the whole area that may be drawn on, lane by lane, without looking."""
+    """Wipe the whole area that may be painted on, lane by lane, without looking."""
 
     def __init__(self, config: WipingConfig, num_envs: int):
         super().__init__(config, num_envs)

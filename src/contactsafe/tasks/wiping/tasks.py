@@ -98,19 +98,19 @@ class WipingTasks(Tasks):
         return PhotographSource(self.worlds, self.boards)
 
     def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
-        """Paint board i and draw the tool's start."""
+        """Paint board i and sample the tool's start."""
         config, board = self.config, self.boards.boards[i]
         board.clear()
         drawing, start = options.get("drawing"), options.get("start")
         if drawing is None:
             paint_board(board, config.boards, rng)
         else:
-            board.draw(drawing)
+            board.paint(drawing)
         if start is None:
             reach = config.start_reach
             start = np.add(config.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)])
         if self._variation is not None:
-            self._variation.draw(i, rng)
+            self._variation.sample(i, rng)
         return Pose(np.asarray(start, dtype=float), DOWN)
 
     def after_reset(self, i: int, rng: np.random.Generator) -> None:
@@ -139,7 +139,7 @@ class WipingTasks(Tasks):
             self._variation.look_first(i)
 
     def before_step(self) -> None:
-        """Take in what was drawn on the boards since the last step."""
+        """Take in what was painted on the boards since the last step."""
         self.boards.enter_changed()
 
     def finish_step(self, start: int, stop: int) -> None:

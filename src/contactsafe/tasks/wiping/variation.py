@@ -1,4 +1,4 @@
-"""Worlds that differ from episode to episode: what was drawn goes into plant, camera and pictures."""
+"""Worlds that differ from episode to episode: what was sampled goes into plant, camera and pictures."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,7 +16,7 @@ from contactsafe.robot.mjcf import TIP_GEOM
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.board import Camera
 from contactsafe.tasks.wiping.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
-from contactsafe.tasks.wiping.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, draw, draw_dtype
+from contactsafe.tasks.wiping.randomisation import MAX_DELAY_STEPS, POSSIBLE, Randomisation, sample, sampled_dtype
 from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 CAMERAS = 16
@@ -26,21 +26,21 @@ _CHANGED = ("body_pos", "body_quat", "body_mass", "body_inertia", "geom_friction
 
 
 class Variation(Independent):
-    """Draws what differs and makes it so.
+    """Samples what differs and makes it so.
 
     Args:
         worlds: each with a model of its own.
         boards: in them.
-        ranges: that every episode draws from.
+        ranges: that every episode samples.
 
     Attributes:
-        drawn: `draw_dtype` records of the episodes that run, (n,).
+        sampled: `sampled_dtype` records of the episodes that run, (n,).
     """
 
     def __init__(self, worlds: Worlds, boards: Whiteboards, ranges: Randomisation):
         _refuse_too_light(worlds, ranges)
         self._worlds, self._boards, self._ranges = worlds, boards, ranges
-        self.drawn = np.zeros(worlds.n, dtype=draw_dtype)
+        self.sampled = np.zeros(worlds.n, dtype=sampled_dtype)
         self._plants = [_Plant(worlds, boards, i) for i in range(worlds.n)]
         # Their places are the same in every run: a run that goes on must find them again.
         rng = np.random.default_rng(0)
@@ -50,25 +50,25 @@ class Variation(Independent):
         self._newest = np.zeros(worlds.n, dtype=np.int64)
         self._random = np.ones(worlds.n, dtype=np.uint64)
 
-    def draw(self, i: int, rng: np.random.Generator) -> None:
-        """Draw anew for world i; reset it next."""
-        self.drawn[i] = draw(self._ranges, CAMERAS, rng)
+    def sample(self, i: int, rng: np.random.Generator) -> None:
+        """Sample anew for world i; reset it next."""
+        self.sampled[i] = sample(self._ranges, CAMERAS, rng)
         self._random[i] = rng.integers(1, 2**63)
         self._apply(i)
 
     def look(self, start: int, stop: int) -> None:
         """Take the masks of worlds start to stop as they are, and put what the policy sees of them in their place."""
-        _look(start, stop, self.drawn, self._boards.masks, self._frames, self._newest, self._random)
+        _look(start, stop, self.sampled, self._boards.masks, self._frames, self._newest, self._random)
 
     def look_first(self, i: int) -> None:
         """The same, as if what is seen had been there for long."""
-        _corrupt(self._boards.masks[i], self.drawn[i : i + 1], self._random[i : i + 1])
+        _corrupt(self._boards.masks[i], self.sampled[i : i + 1], self._random[i : i + 1])
         self._frames[i] = self._boards.masks[i]
 
     def state_entries(self) -> dict[str, Entry]:
         """List what decides the future."""
         return {
-            "drawn": Entry(self._read_drawn, self._write_drawn, self._check_drawn),
+            "sampled": Entry(self._read_sampled, self._write_sampled, self._check_sampled),
             "frames": of_array(self._frames),
             "newest": of_array(self._newest, 0, MAX_DELAY_STEPS),
             "random": of_array(self._random.view(np.int64), -np.inf, np.inf),
@@ -82,29 +82,29 @@ class Variation(Independent):
         """Load the worlds' models; their state is loaded by the worlds, after this."""
         load_state_dict(self.state_entries(), state)
 
-    def _read_drawn(self) -> dict[str, np.ndarray]:
-        return {name: self.drawn[name].copy() for name in draw_dtype.names or ()}
+    def _read_sampled(self) -> dict[str, np.ndarray]:
+        return {name: self.sampled[name].copy() for name in sampled_dtype.names or ()}
 
-    def _write_drawn(self, value: Mapping[str, np.ndarray]) -> None:
-        for name in draw_dtype.names or ():
-            self.drawn[name] = value[name]
+    def _write_sampled(self, value: Mapping[str, np.ndarray]) -> None:
+        for name in sampled_dtype.names or ():
+            self.sampled[name] = value[name]
         for i in range(self._worlds.n):
             self._apply(i)
 
-    def _check_drawn(self, value: Mapping[str, np.ndarray]) -> None:
+    def _check_sampled(self, value: Mapping[str, np.ndarray]) -> None:
         possible = {"camera": (0, CAMERAS - 1), **POSSIBLE}
-        # Before the first draw all are 0.
+        # Before the first episode all are 0.
         entries = {
-            name: of_array(self.drawn[name], min(low, 0), high)
+            name: of_array(self.sampled[name], min(low, 0), high)
             for name, (low, high) in possible.items()
-            if name in (draw_dtype.names or ())
+            if name in (sampled_dtype.names or ())
         }
         check_state_dict(entries, value)
 
     def _apply(self, i: int) -> None:
-        self._boards.records[i]["camera"] = self.drawn[i]["camera"]
+        self._boards.records[i]["camera"] = self.sampled[i]["camera"]
         self._boards.boards[i].changed = True  # as another camera sees it
-        self._plants[i].apply(self.drawn[i])
+        self._plants[i].apply(self.sampled[i])
 
 
 def _refuse_too_light(worlds: Worlds, ranges: Randomisation) -> None:
@@ -118,7 +118,7 @@ def _refuse_too_light(worlds: Worlds, ranges: Randomisation) -> None:
 
 
 def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) -> Camera:
-    """Draw where a camera really stands and looks; turning it moves what it looks at."""
+    """Sample where a camera really stands and looks; turning it moves what it looks at."""
     moved, turned = rng.uniform(*ranges.camera_m, 3), rng.uniform(*ranges.camera_rad, 3)
     position = np.array(camera.position) + moved
     axis = np.array(camera.target) + moved - position
@@ -127,7 +127,7 @@ def _perturbed(camera: Camera, ranges: Randomisation, rng: np.random.Generator) 
 
 
 class _Plant:
-    """One world's plant as it was built, from which every draw starts."""
+    """One world's plant as it was built, from which every episode starts."""
 
     def __init__(self, worlds: Worlds, boards: Whiteboards, i: int):
         # Not the records themselves: a copy of this would keep the old ones.
@@ -139,39 +139,39 @@ class _Plant:
         self._links = [k for k in range(model.nbody) if model.body(k).name.startswith("link")]
         self._kept = {name: getattr(model, name).copy() for name in _CHANGED}
 
-    def apply(self, drawn) -> None:
-        """Make model and record those that were drawn."""
+    def apply(self, sampled) -> None:
+        """Make model and record those that were sampled."""
         model, errors = self._worlds.models[self._i], self._worlds.records[self._i]["errors"]
         for name, value in self._kept.items():
             getattr(model, name)[:] = value
-        model.body_pos[self._board, 2] += drawn["board_height_m"]
-        mujoco.mju_euler2Quat(model.body_quat[self._board], [*drawn["board_tilt_rad"], 0.0], "xyz")
-        model.geom_friction[self._pad, 0] *= drawn["friction"]
-        model.geom_size[self._pad, :2] *= drawn["pad_size"]
-        model.body_mass[self._links] *= drawn["inertia"]
-        model.body_inertia[self._links] *= drawn["inertia"]
-        model.body_mass[self._tool] += drawn["payload_kg"]
+        model.body_pos[self._board, 2] += sampled["board_height_m"]
+        mujoco.mju_euler2Quat(model.body_quat[self._board], [*sampled["board_tilt_rad"], 0.0], "xyz")
+        model.geom_friction[self._pad, 0] *= sampled["friction"]
+        model.geom_size[self._pad, :2] *= sampled["pad_size"]
+        model.body_mass[self._links] *= sampled["inertia"]
+        model.body_inertia[self._links] *= sampled["inertia"]
+        model.body_mass[self._tool] += sampled["payload_kg"]
         errors["friction"] = self._friction
-        errors["friction"][:, 0] *= drawn["joint_friction"]
-        self._boards.records[self._i]["pad_half"] = self._pad_half * drawn["pad_size"]
-        errors["delay_ticks"] = max(self._delay, drawn["torque_delay_ticks"])
+        errors["friction"][:, 0] *= sampled["joint_friction"]
+        self._boards.records[self._i]["pad_half"] = self._pad_half * sampled["pad_size"]
+        errors["delay_ticks"] = max(self._delay, sampled["torque_delay_ticks"])
 
 
 @compiled(nogil=True)
-def _look(start, stop, drawn, masks, frames, newest, random):
+def _look(start, stop, sampled, masks, frames, newest, random):
     for i in range(start, stop):
-        _corrupt(masks[i], drawn[i : i + 1], random[i : i + 1])
+        _corrupt(masks[i], sampled[i : i + 1], random[i : i + 1])
         count = frames.shape[1]
         newest[i] = (newest[i] + 1) % count
         copy_picture(masks[i], frames[i, newest[i]])
-        if drawn[i].delay_steps > 0:
-            copy_picture(frames[i, (newest[i] - drawn[i].delay_steps) % count], masks[i])
+        if sampled[i].delay_steps > 0:
+            copy_picture(frames[i, (newest[i] - sampled[i].delay_steps) % count], masks[i])
 
 
 @compiled(nogil=True)
-def _corrupt(mask, drawn, random):
+def _corrupt(mask, sampled, random):
     """Miss some ink pixels of a mask and invent others."""
-    missed, invented = drawn[0].ink_missed, drawn[0].ink_invented
+    missed, invented = sampled[0].ink_missed, sampled[0].ink_invented
     flat = mask.reshape(-1)
     if missed > 0.0:
         inked = np.empty(flat.shape[0], dtype=np.int32)
@@ -184,7 +184,7 @@ def _corrupt(mask, drawn, random):
 
 @compiled
 def _uniform(random):
-    """Draw from [0, 1): xorshift64* of Vigna 2016; its state is `random`, (1,) uint64."""
+    """Sample from [0, 1): xorshift64* of Vigna 2016; its state is `random`, (1,) uint64."""
     x = random[0]
     x ^= x >> np.uint64(12)
     x ^= x << np.uint64(25)

@@ -1,4 +1,4 @@
-"""Ink on the whiteboard: a grid of cells, strokes and blobs drawn at random, erased by a pressed pad."""
+"""Ink on the whiteboard: a grid of cells, strokes and blobs painted at random, erased by a pressed pad."""
 
 import math
 
@@ -19,7 +19,7 @@ class Whiteboard(Independent):
 
     Attributes:
         cells: what lies in each cell, uint8, (rows along x, columns along y).
-        changed: whether anything was drawn, laid or cleared since this was last set to false. Who writes ink into the
+        changed: whether anything was painted, laid or cleared since this was last set to false. Who writes ink into the
             cells by other means than the methods here sets it; who takes ink away need not.
     """
 
@@ -46,8 +46,8 @@ class Whiteboard(Independent):
         self.cells[:] = CLEAN
         self.changed = True
 
-    def draw(self, drawing: np.ndarray) -> None:
-        """Put a drawing on the part of the board that may be drawn on.
+    def paint(self, drawing: np.ndarray) -> None:
+        """Put a drawing on the part of the board that may be painted on.
 
         Args:
             drawing: true where ink is, (n, n); scaled to the area by nearest cell, row 0 nearest the robot.
@@ -67,7 +67,7 @@ class Whiteboard(Independent):
         self.changed = True
 
     def sample_random(self, rng: np.random.Generator) -> None:
-        """Draw one to four strokes and up to two blobs somewhere in the ink area."""
+        """Paint one to four strokes and up to two blobs somewhere in the ink area."""
         size = self._ink_rows.stop - self._ink_rows.start
         drawing = np.zeros((size, size), dtype=np.uint8)
         for _ in range(rng.integers(1, 5)):
@@ -75,7 +75,7 @@ class Whiteboard(Independent):
         for _ in range(rng.integers(0, 3)):
             centre = rng.uniform(0.1, 0.9, 2) * size
             _stamp(drawing, centre[0], centre[1], rng.uniform(0.006, 0.016) / self.config.cell)
-        self.draw(drawing)
+        self.paint(drawing)
 
     def place_object(self, centre: tuple[float, float], size: tuple[float, float]) -> None:
         """Lay a flat dark object on the board.
@@ -93,7 +93,7 @@ class Whiteboard(Independent):
 
 
 def _paint_stroke(drawing: np.ndarray, rng: np.random.Generator, cell: float) -> None:
-    """Draw a smooth random walk of the pen: 8 to 28 cm long, 6 to 12 mm wide."""
+    """Sample a smooth random walk of the pen: 8 to 28 cm long, 6 to 12 mm wide."""
     size = drawing.shape[0]
     radius = rng.uniform(0.003, 0.006) / cell
     point = rng.uniform(0.1, 0.9, 2) * size

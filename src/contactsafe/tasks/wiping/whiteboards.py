@@ -114,7 +114,7 @@ class Whiteboards(Independent):
             self.enter_ink(i)
 
     def enter_ink(self, i: int) -> None:
-        """Enter what lies on board i and where its camera shows it: it was drawn on, or the camera changed."""
+        """Enter what lies on board i and where its camera shows it: it was painted on, or the camera changed."""
         enter(self.ink_index, i, self.cells[i], self.cameras.pixels[self.records[i]["camera"]])
         self.boards[i].changed = False
 
