@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from contactsafe.core.errors import ContactSafeError
-from contactsafe.policy import graph
+from contactsafe.policy import onnx_graph
 from contactsafe.policy.bundle import POLICY, blank_observation, shipped_bundle
 from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.policy.operators import RULES
@@ -114,7 +114,7 @@ def _replace_file(folder, rng):
 
 def _change_graph(folder, rng):
     """Change a field of the model's file somewhere, and seal it anew."""
-    model = graph._messages()["Model"]()
+    model = onnx_graph._messages()["Model"]()
     model.ParseFromString((folder / POLICY).read_bytes())
     for _ in range(rng.choice((1, 1, 3))):
         _mutate(rng.choice(list(_messages_in(model))), rng)
@@ -124,7 +124,7 @@ def _change_graph(folder, rng):
 
 def _add_operators(folder, rng):
     """Put operators into the graph that cost much, are not allowed, or make no sense."""
-    model = graph._messages()["Model"]()
+    model = onnx_graph._messages()["Model"]()
     model.ParseFromString((folder / POLICY).read_bytes())
     names = [name for node in model.graph.node for name in node.output]
     kind = rng.choice(
@@ -147,7 +147,7 @@ def _add_operators(folder, rng):
 
 def _drop_ends(folder, rng):
     """Take all outputs or inputs from an operator, most often from one put in between."""
-    model = graph._messages()["Model"]()
+    model = onnx_graph._messages()["Model"]()
     model.ParseFromString((folder / POLICY).read_bytes())
     node = rng.choice(model.graph.node)
     if rng.random() < 0.7:

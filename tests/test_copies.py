@@ -343,7 +343,7 @@ ACTORS = {
 NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
 """PyTorch's own: it copies them."""
 
-BASES = {"Environment", "Independent", "Tasks"}
+BASES = {"Environment", "Independent", "TaskScenes", "Tasks"}
 """Nothing by themselves: their subclasses have entries."""
 
 
