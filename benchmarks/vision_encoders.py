@@ -18,8 +18,8 @@ from torch import nn
 from torch.nn import functional
 
 from contactsafe.learning.encoder import EncoderConfig
-from contactsafe.learning.probe import nearest_ink
-from contactsafe.learning.train_vae import HELD_OUT_SEED, VaeConfig, train_vae
+from contactsafe.learning.probe import nearest_foreground
+from contactsafe.learning.train_vae import HELD_OUT_MASKS_SEED, VaeConfig, train_vae
 from contactsafe.policy.perception import Perception, open_session
 from contactsafe.tasks.wiping.sampling import MaskSampler
 from contactsafe.vision.rectify import WINDOW_M, rectify
@@ -57,7 +57,9 @@ def boards(sampler, count, seed):
     masks, tools, ink = masks[seen], tools[seen], (fine[seen] == 0)
     side = ink.shape[1] // CELLS
     cells = ink.reshape(len(ink), CELLS, side, CELLS, side).any((2, 4)).reshape(len(ink), -1)
-    return Boards(masks, tools, nearest_ink(ink[:, None].astype(np.float32), WINDOW_M), cells, (masks == 0).sum((1, 2)))
+    return Boards(
+        masks, tools, nearest_foreground(ink[:, None].astype(np.float32), WINDOW_M), cells, (masks == 0).sum((1, 2))
+    )
 
 
 def reader(inputs, outputs):
@@ -163,7 +165,7 @@ def main():
     """Print the table."""
     torch.set_num_threads(1)
     sampler = MaskSampler()
-    train, test = boards(sampler, PICTURES, 0), boards(sampler, HELD_OUT, HELD_OUT_SEED)
+    train, test = boards(sampler, PICTURES, 0), boards(sampler, HELD_OUT, HELD_OUT_MASKS_SEED)
     heads = [f"{low} to {high - 1} pixels" for low, high in AMOUNTS[:-1]] + [f"{AMOUNTS[-1][0]} and more"]
     print("| encoder | numbers | active | min | " + " | ".join(heads) + " |\n|" + "---|" * (4 + len(heads)))
     features = Perception(None, "log_polar", WINDOW_M, train.masks.shape[1], sampler.homography)
