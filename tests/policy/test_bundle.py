@@ -614,7 +614,7 @@ def test_export_does_not_overwrite_unasked_and_leaves_nothing_behind(bundle, tmp
     before = (bundle / "bundle.json").read_bytes()
     with pytest.raises(OutputError) as error:
         export_bundle(bundle, encoder, layers, scaling, DESCRIPTION)
-    assert str(error.value) == f"{bundle} exists; give --force to replace it, or another folder"
+    assert str(error.value) == f"{bundle} exists; pass force=True to replace it, or give another folder"
     with pytest.raises(OutputError, match="nothing was changed"):
         export_bundle(bundle, b"no model", layers, scaling, DESCRIPTION, force=True)
     assert (bundle / "bundle.json").read_bytes() == before
