@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.policy.action_checks import check_bounds, check_steps
 
 ACTIONS = tuple(
     f"{group}_{axis}"
@@ -75,32 +76,8 @@ class ActionConfig:
         """Refuse gains that are unknown, and steps and bounds that cannot be."""
         if self.gains not in GAINS:
             raise InvalidInputError(f"gains = {shown(self.gains)}; choose from {', '.join(GAINS)}")
-        self._check_steps()
-        self._check_bounds()
-
-    def _check_steps(self) -> None:
-        if not (len(self.translation) == 3 and all(0.0 < step < math.inf for step in self.translation)):
-            raise InvalidInputError(f"action translation = {self.translation}; give three steps greater than 0 m")
-        for name, count in (("rotation", 3), ("stiffness", 6), ("damping", 6)):
-            steps = getattr(self, name)
-            if not (len(steps) == count and all(0.0 <= step < math.inf for step in steps)):
-                raise InvalidInputError(f"action {name} = {steps}; give {count} steps of 0 or more")
-
-    def _check_bounds(self) -> None:
-        for name in ("stiffness", "damping"):
-            low, high = getattr(self, f"{name}_low"), getattr(self, f"{name}_high")
-            pairs = zip(low, high, strict=False)
-            if not (len(low) == len(high) == 6 and all(0.0 < least <= most < math.inf for least, most in pairs)):
-                raise InvalidInputError(f"action {name} = {low} to {high}; give six each, with 0 < low ≤ high")
-        if not (len(self.stiffness_start) == 6 and all(0.0 < start < math.inf for start in self.stiffness_start)):
-            raise InvalidInputError(f"action stiffness_start = {self.stiffness_start}; give six greater than 0 1/s²")
-        if not (self.offset_max > 0.0 and self.offset_max_z > 0.0):
-            found = f"offset_max = {self.offset_max}, offset_max_z = {self.offset_max_z}"
-            raise InvalidInputError(f"action {found}; give more than 0 m, or inf for no bound")
-        spans = (self.reach, self.tilt, self.press + self.height)
-        if not all(0.0 <= span < math.inf for span in spans):
-            found = f"reach = {self.reach}, tilt = {self.tilt}, press = {self.press}, height = {self.height}"
-            raise InvalidInputError(f"action {found}; give a reach, a tilt and a press + height of 0 or more")
+        check_steps(self)
+        check_bounds(self)
 
     @property
     def stiffness_range(self) -> tuple[np.ndarray, np.ndarray]:
