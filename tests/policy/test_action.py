@@ -167,3 +167,24 @@ def test_what_gains_leave_to_learn():
     with pytest.raises(InvalidInputError) as error:
         ActionConfig(gains="soft")
     assert str(error.value) == "gains = 'soft'; choose from learned, low, middle, high"
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"translation": (0.0, 0.001, 0.001)}, "translation = (0.0, 0.001, 0.001); give three steps greater than 0 m"),
+        ({"rotation": (-0.1, 0.0, 0.0)}, "rotation = (-0.1, 0.0, 0.0); give 3 steps of 0 or more"),
+        ({"damping": (1.0,)}, "damping = (1.0,); give 6 steps of 0 or more"),
+        ({"stiffness_low": (300.0,) * 6}, "give six each, with 0 < low ≤ high"),
+        ({"damping_high": (float("nan"),) * 6}, "give six each, with 0 < low ≤ high"),
+        ({"stiffness_start": (0.0,) * 6}, "give six greater than 0 1/s²"),
+        ({"offset_max": -0.01}, "offset_max = -0.01, offset_max_z = inf; give more than 0 m, or inf for no bound"),
+        ({"reach": -0.1}, "give a reach, a tilt and a press + height of 0 or more"),
+        ({"press": -0.2, "height": 0.1}, "give a reach, a tilt and a press + height of 0 or more"),
+    ],
+)
+def test_steps_and_bounds_that_cannot_be_are_refused(fields, told):
+    with pytest.raises(InvalidInputError) as error:
+        ActionConfig(**fields)
+    assert str(error.value).startswith("action ")
+    assert told in str(error.value)

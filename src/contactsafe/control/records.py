@@ -84,7 +84,7 @@ def state_dtype(n: int) -> np.dtype:
             ("started", _i),  # 0 before the first tick after a reset
             ("turn", _i),  # joint whose torque masses are identified from next
             ("mode", _i),  # FREE, COMPLY or REJECT
-            ("fault", _i),  # first fault since reset
+            ("fault", _i),  # first since reset, or what replaced it; see codes.FAULTS
             ("arm", arm_state_dtype(n)),
             ("target", target_dtype(n)),  # last good one
             ("command", command_dtype(n)),

@@ -73,7 +73,8 @@ class Output(NamedTuple):
         limited_by: what took something off the task or the command: some of 'contact' (the bound on the force along
             it), 'tool force' (`tool_force_limit_n`), 'energy' (the tank), 'rate' (torque or torque rate), 'range'
             (joint range or speed), and 'load' where what takes it off is what the tool carries; () where nothing did.
-        fault: 'none', or the first reason since reset why a number was refused; why the arm is braked, if it is.
+        fault: 'none', or the first reason since reset why a number was refused; in its place why the arm is braked, if
+            it is, or else that an unknown load keeps the tool off.
         bridged: ticks in a row, up to this one, whose measurement was missing or not believed, and predicted.
         target_late: whether no new target came for so long that the tool is brought to rest.
         braked: whether the arm is braked until `reset`, for the reason that `fault` gives.

@@ -95,7 +95,7 @@ def tick_at(controllers: np.ndarray, i: int) -> None:
 
 @compiled
 def latch(state: Record, fault: int) -> None:
-    """Keep the first fault since reset; 0 is none."""
+    """Keep the first fault since reset, 0 is none; what brakes the arm and LOAD are written over it."""
     if state.fault == 0:
         state.fault = fault
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.policy.action_checks import check_bounds, check_steps
 
 ACTIONS = tuple(
     f"{group}_{axis}"
@@ -72,9 +73,11 @@ class ActionConfig:
     gains: str = LEARNED_GAINS
 
     def __post_init__(self) -> None:
-        """Refuse gains that are unknown."""
+        """Refuse gains that are unknown, and steps and bounds that cannot be."""
         if self.gains not in GAINS:
             raise InvalidInputError(f"gains = {shown(self.gains)}; choose from {', '.join(GAINS)}")
+        check_steps(self)
+        check_bounds(self)
 
     @property
     def stiffness_range(self) -> tuple[np.ndarray, np.ndarray]:

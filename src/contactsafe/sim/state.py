@@ -7,6 +7,7 @@ import numpy as np
 
 from contactsafe.core.errors import shown
 from contactsafe.core.state import Entry, StateError, check_state_dict, of_array
+from contactsafe.sim.model_changes import CHANGED
 from contactsafe.sim.mujoco_record import VIEWED
 
 _READ = (*VIEWED, "cdof", "subtree_com")
@@ -16,14 +17,15 @@ _READ = (*VIEWED, "cdof", "subtree_com")
 def of_physics(models: Sequence[mujoco.MjModel], datas: Sequence[mujoco.MjData]) -> Entry:
     """Make an entry of MuJoCo's data.
 
-    Its state says how it goes on. The arrays that compiled code reads are kept beside it, for after a step they still
-    belong to that step's beginning and cannot be computed from where it ended.
+    Its state says how it goes on, with what episodes change in the model. The arrays that compiled code reads are kept
+    beside it, for after a step they still belong to that step's beginning and cannot be computed from where it ended.
     """
 
     def write(values: Sequence[Mapping[str, np.ndarray]]) -> None:
         for model, data, value in zip(models, datas, values, strict=True):
             mujoco.mj_setState(model, data, value["state"], mujoco.mjtState.mjSTATE_INTEGRATION)
-            model.qpos_spring[:] = value["qpos_spring"]
+            for name in CHANGED:
+                getattr(model, name)[...] = value[name]
             for name in _READ:
                 getattr(data, name)[...] = value[name]
 
@@ -42,5 +44,5 @@ def _physics(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, np.ndarray
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     state = np.empty(mujoco.mj_stateSize(model, kind))
     mujoco.mj_getState(model, data, state, kind)
-    arrays = {name: getattr(data, name).copy() for name in _READ}
-    return {"state": state, "qpos_spring": model.qpos_spring.copy(), **arrays}
+    of_model = {name: getattr(model, name).copy() for name in CHANGED}
+    return {"state": state, **of_model, **{name: getattr(data, name).copy() for name in _READ}}

@@ -16,9 +16,8 @@ from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent, Threads
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_records, state_dict
-from contactsafe.robot.arm import Arm, require_arm
-from contactsafe.robot.mjcf import TIP_GEOM
-from contactsafe.sim import mujoco_backend
+from contactsafe.robot.arm import Arm, finite_array, require_arm
+from contactsafe.sim import model_changes, mujoco_backend
 from contactsafe.sim.backend import Backend, StepArrays, run_backend
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.mujoco_record import fill_plant, point_plant
@@ -272,31 +271,29 @@ class Worlds(Independent):
         return ticks
 
     def place_fixture(self, i: int, name: str, position: ArrayLike, quat: ArrayLike) -> None:
-        """Put a fixture of world i elsewhere; its worlds must have a model each. Reset the world next.
+        """Put a fixture of world i elsewhere; the worlds must have a model each. Reset the world next.
 
         Args:
             i: which world.
             name: of the fixture.
             position: of its frame, world, (3,), m.
             quat: its orientation, w x y z, (4,).
+
+        Raises:
+            InvalidInputError: other worlds use the model, there is no such fixture, or the place is none.
         """
-        body = self.models[i].body(name).id
-        self.models[i].body_pos[body], self.models[i].body_quat[body] = position, quat
+        model = model_changes.own_model(self.models, i)
+        position, quat = model_changes.place_fixture(model, self.configs[i], name, position, quat)
         if self.backends:
-            self.backends[i].place_fixture(name, np.asarray(position, float), np.asarray(quat, float))
+            self.backends[i].place_fixture(name, position, quat)
 
     def set_tip_friction(self, i: int, friction: float) -> None:
         """Give the tip of world i's tool another Coulomb coefficient; reset the world next.
 
         Raises:
-            InvalidInputError: it has no tip.
+            InvalidInputError: it has no tip, other worlds use the model, or the coefficient is none.
         """
-        if self.arm.tool is None or self.arm.tool.tip is None:
-            raise InvalidInputError(
-                f"arm '{self.arm.name}' has no tip to work with; give it a tool that has, or robots.from_mjcf(..., "
-                "tip=robots.Tip(...))"
-            )
-        self.models[i].geom_friction[self.models[i].geom(TIP_GEOM).id, 0] = friction
+        model_changes.set_tip_friction(model_changes.own_model(self.models, i), self.arm, friction)
         if self.backends:
             self.backends[i].set_tip_friction(friction)
 
@@ -312,9 +309,13 @@ class Worlds(Independent):
             force: world axes, (3,), N.
             start_s, stop_s: since reset, s.
             ramp_s: time from nothing to full force, s.
+
+        Raises:
+            InvalidInputError: no such body, or numbers that are none.
         """
+        index = model_changes.pushed_body(self.models[i], self.arm, body)
+        point, force = finite_array(point, (3,), "point"), finite_array(force, (3,), "force")
         push = self.records[i]["push"]
-        push["body"] = self.models[i].body(body).id
-        push["point"], push["force"] = point, force
+        push["body"], push["point"], push["force"] = index, point, force
         push["start"], push["stop"] = round(start_s / TICK_S), round(stop_s / TICK_S)
         push["ramp"] = max(1, round(ramp_s / TICK_S))

@@ -49,7 +49,9 @@ def test_an_episode_that_ends_begins_anew_in_the_same_step(envs):
         assert not same(drawn(info["final_obs"][i]), drawn(row(observation, i)))
     for name in (*(f"reward_{term}" for term in tasks.reward_terms), "is_success", "tool_force_n"):
         assert_array_equal(info["final_info"][f"_{name}"], True)
-        assert_array_equal(info["final_info"][name], info[name])
+        assert info["final_info"][name].dtype == info[name].dtype
+        assert not info[name].any()
+        assert not info[f"_{name}"].any()
     _, _, terminated, truncated, info = envs.step(IDLE)
     assert not truncated.any()
     assert "final_info" not in info
@@ -62,7 +64,7 @@ def test_only_what_ended_is_marked(envs_in):
     assert_array_equal(info["_final_obs"], truncated)
     assert_array_equal(info["final_info"]["_is_success"], truncated)
     assert info["final_obs"][0] is None
-    assert_array_equal(info["_is_success"], True)
+    assert_array_equal(info["_is_success"], ~truncated)
     assert envs.tasks.tasks["steps"].tolist() == [1, 0, 1]
 
 
@@ -76,6 +78,30 @@ def test_in_the_next_step_an_action_is_ignored_and_its_reward_nothing(envs_in):
     assert not (terminated | truncated).any()
     assert not same(drawn(row(last, 1)), drawn(row(observation, 1)))
     assert envs.tasks.tasks["steps"].tolist() == [2, 0, 2]
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_a_success_was_reported_again_by_the_step_that_reset_it(envs_in, mode):
+    envs = envs_in(mode)
+    finish_step = envs.tasks.finish_step
+
+    def succeed_at_once(start, stop):
+        finish_step(start, stop)
+        envs.tasks.tasks["success"][start:stop] |= envs.tasks.tasks["steps"][start:stop] == envs.tasks.step_limit
+
+    envs.tasks.finish_step = succeed_at_once
+    successes = np.zeros(3, int)
+    for _ in range(3):
+        _, reward, terminated, _, info = envs.step(IDLE)
+        successes += info["is_success"] + info.get("final_info", {"is_success": 0})["is_success"]
+        begun = ~info["_is_success"]
+        for name in (f"reward_{term}" for term in envs.tasks.reward_terms):
+            assert_array_equal(info[f"_{name}"], ~begun)
+            assert not info[name][begun].any()
+        if mode is AutoresetMode.NEXT_STEP:
+            assert not reward[begun].any()
+            assert not terminated[begun].any()
+    assert_array_equal(successes, (0, 1, 0))
 
 
 def test_a_mode_decides_when_and_not_what(envs_in):

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 from tests.learning.fakes import FakeWiping
 
 from contactsafe.core.errors import InvalidInputError
@@ -67,6 +68,16 @@ def test_running_a_policy_needs_no_torch():
         "assert not {'torch', 'stable_baselines3', 'onnx'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_an_environment_that_resets_otherwise_is_refused():
+    env = FakeWiping(1)
+    env.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+    with pytest.raises(InvalidInputError) as error:
+        evaluate_policy(None, env, 1, seed=0)
+    assert str(error.value) == (
+        "the environment resets by AutoresetMode.NEXT_STEP; make it with AutoresetMode.SAME_STEP"
+    )
 
 
 def test_no_episodes_is_refused():

@@ -17,6 +17,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks import task_by_name
 from contactsafe.tasks.base.task_env import TaskEnv
 from contactsafe.tasks.base.task_vector_env import TaskVectorEnv
+from contactsafe.tasks.base.tasks import Tasks
 
 IDLE = np.zeros(18, np.float32)
 
@@ -90,6 +91,9 @@ def test_what_it_cannot_be_made_with_is_told(make, task):
         f"config is dict; give a {kind.__name__} ({kind.__module__}), such as {kind.__name__}(episode_s=10.0)"
     )
     assert refusal(make, task=task, render_mode="human") == "render_mode = 'human'; choose rgb_array, or None"
+    unseen = type("Unseen", (task_by_name(task).simulation,), {"picture": Tasks.picture})
+    text = f"render_mode = 'rgb_array'; task '{task}' has no picture, give None"
+    assert refusal(make, task=unseen, render_mode="rgb_array") == text
     text = "max_episode_steps = 0; give 1 or more, or None for the config's"
     assert refusal(make, task=task, max_episode_steps=0) == text
     assert refusal(make, task=task, engine="steam") == "engine = 'steam'; choose mujoco or pybullet"

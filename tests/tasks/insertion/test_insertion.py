@@ -1,12 +1,17 @@
 """Insertion: what is drawn and observed, what pays, how it ends."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from contactsafe.core.errors import ContactSafeError, InvalidInputError
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks import make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
+from contactsafe.tasks.base.task_env import TaskEnv
+from contactsafe.tasks.insertion import picture
 from contactsafe.tasks.insertion.config import InsertionConfig
 from contactsafe.tasks.insertion.scripted import SCRIPTED
 from contactsafe.tasks.insertion.tasks import InsertionTasks
@@ -118,6 +123,7 @@ def test_scripts_are_gentle_and_a_search_finds_more_than_going_straight_down():
         ({"error_m": -1.0}, "error_m = -1.0, tilt_rad = 0.035; give at most 0.02 m and 0.2 rad, none negative"),
         ({"start_m": (0.02, 0.01)}, "start_m = (0.02, 0.01); give (low, high) with 0 ≤ low ≤ high ≤ 0.2 m"),
         ({"friction": (0.5, 0.1)}, "friction = (0.5, 0.1); give (low, high) with 0 ≤ low ≤ high ≤ 2"),
+        ({"mouth": (0.5, float("nan"), 0.05)}, "mouth = (0.5, nan, 0.05); give three finite numbers x, y, z, m"),
         ({"episode_s": 0}, "episode_s = 0; give seconds, from 1/60 to 86400, a day"),
     ],
 )
@@ -132,13 +138,63 @@ def test_holes_that_cannot_be_are_refused(fields, told):
     [
         ("high", "height is str, not numbers; give one finite number"),
         (float("nan"), "height = nan; every number must be finite"),
-        (10.0, "task 'insertion' needs the tool at"),
+        (-0.02, "height = -0.02; give 0 to 0.2 m above the believed mouth"),
+        (10.0, "height = 10.0; give 0 to 0.2 m above the believed mouth"),
     ],
 )
-def test_a_height_that_cannot_be_is_refused_in_one_line(height, told):
-    with pytest.raises(ContactSafeError) as error:
-        begun(height=height)
-    assert str(error.value).startswith(told)
+def test_a_height_that_cannot_be_is_refused_before_the_block_moves(height, told):
+    tasks = begun()
+    before = tasks.state_dict()
+    with pytest.raises(InvalidInputError) as error:
+        tasks.reset(0, np.random.default_rng(1), height=height)
+    assert str(error.value) == told
+    np.testing.assert_equal(tasks.state_dict(), before)
+
+
+def test_an_insertion_in_contact_was_resumed_with_the_block_as_built():
+    tasks = begun(InsertionConfig(error_m=0.02, tilt_rad=0.1), n=3)
+    for _ in range(60):
+        tasks.step(np.repeat(down(), 3, axis=0))
+    assert (tasks.tasks["force_peak"] > 3.0).sum() >= 2
+    state = tasks.state_dict()
+    others = begun(InsertionConfig(error_m=0.02, tilt_rad=0.1), n=3, seed=7)
+    others.load_state_dict(state)
+    copies = others, copy.deepcopy(tasks), pickle.loads(pickle.dumps(tasks))
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        actions = rng.uniform(-1.0, 1.0, (3, 18))
+        for each in (tasks, *copies):
+            each.step(actions)
+        for each in copies:
+            np.testing.assert_equal(each.observation(), tasks.observation())
+            np.testing.assert_equal(each.info(), tasks.info())
+    for field in ("body_pos", "body_quat", "geom_friction"):
+        for model, other in zip(tasks.worlds.models, others.worlds.models, strict=True):
+            np.testing.assert_array_equal(getattr(other, field), getattr(model, field))
+
+
+def test_the_picture_shows_hole_peg_and_believed_mouth_where_they_are():
+    env = TaskEnv("insertion", render_mode="rgb_array")
+    assert env.metadata["render_modes"] == ["rgb_array"]
+    env.reset(seed=0)
+    seen, task = env.render(), env.tasks.tasks[0]
+    assert seen.shape == (picture.SIZE, picture.SIZE, 3)
+    pixel = 2.0 * picture.HALF_M / picture.SIZE
+    peg = middle(seen, picture.PEG, pixel)
+    assert_allclose(peg, env.tasks.worlds.records[0]["truth"]["position"][:2] - task["believed"][:2], atol=2 * pixel)
+    assert_allclose(middle(seen, picture.BELIEVED, pixel), 0.0, atol=2 * pixel)
+    alone = picture.paint(picture.TopView(np.zeros(2), np.array([0.004, -0.01]), np.ones(2), 0.0105, 0.01, 0.5))
+    hole = (alone == picture.HOLE).all(axis=-1)
+    assert hole.sum() * pixel**2 == pytest.approx(np.pi * 0.0105**2, rel=0.06)  # the cross covers some
+    assert_allclose(middle(alone, picture.HOLE, pixel), (0.004, -0.01), atol=4 * pixel)
+    assert (alone[picture.SIZE // 2 :, -1] == picture.PEG).all()
+    assert (alone[: picture.SIZE // 2, -1] == picture.FACE).all()
+    env.close()
+
+
+def middle(seen, colour, pixel):
+    """The middle of what has a colour, x and y from the picture's, m."""
+    return (picture.SIZE / 2 - np.argwhere((seen == colour).all(axis=-1)).mean(axis=0) - 0.5) * pixel
 
 
 def test_options_become_the_configuration():

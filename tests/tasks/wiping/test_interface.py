@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 from numpy.testing import assert_array_equal
 
 import contactsafe  # noqa: F401 -- registers the task
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import ContactSafeError, InvalidInputError
 from contactsafe.tasks.base.task_env import TaskEnv
 from contactsafe.tasks.base.task_vector_env import TaskVectorEnv
 from contactsafe.tasks.wiping.config import WipingConfig
@@ -67,6 +67,34 @@ def test_a_drawing_of_ones_own(env):
 def test_a_start_of_ones_own(env):
     observation, _ = env.reset(seed=0, options={"start": (0.45, 0.05, 0.06)})
     np.testing.assert_allclose(observation["pose"][:3], (0.45, 0.05, 0.06), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"start": "left"}, "start is str, not numbers; give 3 finite numbers"),
+        ({"start": (0.5, 0.0)}, "start has shape (2,); give 3 finite numbers"),
+        ({"start": (0.5, 0.0, np.nan)}, "start[2] = nan; every number must be finite"),
+        ({"start": (0.5, 0.0, -0.1)}, "start[2] = -0.1 m is below the board; give 0.01 m or more"),
+        ({"start": (9.0, 0.0, 0.1)}, "task 'wiping' needs the tool at"),
+        ({"drawing": np.ones((2, 3))}, "drawing has shape (2, 3); give a square image"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_before_the_board_is_wiped(env, options, told):
+    env.reset(seed=0)
+    before = env.unwrapped.tasks.state_dict()
+    with pytest.raises(ContactSafeError) as error:
+        env.reset(options=options)
+    assert str(error.value).startswith(told)
+    np.testing.assert_equal(env.unwrapped.tasks.state_dict(), before)
+
+
+@pytest.mark.parametrize(
+    "fields", [{"clean_fraction": 1.0}, {"start_reach": -0.1}, {"start_height": (0.1, 0.05)}, {"start_height": (-1, 0)}]
+)
+def test_a_start_that_cannot_be_is_refused(fields):
+    with pytest.raises(InvalidInputError, match=next(iter(fields))):
+        WipingConfig(**fields)
 
 
 def test_rendering_is_the_mask_enlarged():

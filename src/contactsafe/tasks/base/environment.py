@@ -45,14 +45,19 @@ class Environment(Independent):
         max_episode_steps: int | None,
     ) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:
         """Make the tasks; return the spaces of one."""
-        if render_mode is not None and render_mode not in _RENDER_MODES:
-            raise InvalidInputError(f"render_mode = {render_mode!r}; choose {' or '.join(_RENDER_MODES)}, or None")
+        kind = task_by_name(task).simulation if isinstance(task, str) else task
+        modes = _RENDER_MODES if kind.picture is not Tasks.picture else []
+        if render_mode is not None and render_mode not in modes:
+            choice = (
+                f"choose {' or '.join(modes)}, or None" if modes else f"task '{kind.name}' has no picture, give None"
+            )
+            raise InvalidInputError(f"render_mode = {render_mode!r}; {choice}")
+        self.metadata = {**self.metadata, "render_modes": modes}
         if max_episode_steps is not None and max_episode_steps < 1:
             raise InvalidInputError(
                 f"max_episode_steps = {max_episode_steps}; give 1 or more, or None for the config's"
             )
         self.render_mode = render_mode
-        kind = task_by_name(task).simulation if isinstance(task, str) else task
         self.tasks = kind(config, num_envs, arm=arm, backend=backend_of(engine))
         if max_episode_steps is not None:
             self.tasks.step_limit = int(max_episode_steps)
@@ -109,12 +114,6 @@ class Environment(Independent):
                 f"reset options hold {', '.join(unknown)}; known are {', '.join(known) or 'none'}; leave others out"
             )
         return {name: value for name, value in (options or {}).items() if name in self.tasks.reset_options}
-
-    def _picture(self, i: int) -> np.ndarray:
-        picture = getattr(self.tasks, "picture", None)
-        if picture is None:
-            raise InvalidInputError(f"task '{self.tasks.name}' has no picture; make it with render_mode=None")
-        return picture(i)
 
 
 def seed_of(seed: Any) -> int | None:

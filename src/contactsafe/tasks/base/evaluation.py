@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
-from gymnasium.vector import VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.results.metrics import CONTACT_N
@@ -81,8 +81,11 @@ def evaluate_policy(
         episode, by environment and then by time.
 
     Raises:
-        InvalidInputError: episodes is below 1.
+        InvalidInputError: episodes is below 1, or the environment resets otherwise.
     """
+    mode = vec_env.metadata.get("autoreset_mode")
+    if mode != AutoresetMode.SAME_STEP:
+        raise InvalidInputError(f"the environment resets by {mode}; make it with AutoresetMode.SAME_STEP")
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
     run = _Run(policy, vec_env, -(-episodes // vec_env.num_envs), rate_hz, on_episode)

@@ -66,7 +66,7 @@ class TaskEnv(Environment, gymnasium.Env):
         if self.render_mode is None:
             return None
         self._check_order("render")
-        return self._picture(0)
+        return self.tasks.picture(0)
 
     def close(self) -> None:
         """End the simulation; see `gymnasium.Env.close`."""

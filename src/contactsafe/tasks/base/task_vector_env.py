@@ -25,7 +25,8 @@ class TaskVectorEnv(Environment, gymnasium.vector.VectorEnv):
     Same spaces and infos as `TaskEnv`, batched. `reset(options={"reset_mask": mask})` begins new episodes where the
     mask, bool (N,), is true, and leaves the others as they are. What becomes of an episode that ends is Gymnasium's
     autoreset mode: SAME_STEP resets it in the same step, its last observation and info under `final_obs` and
-    `final_info`; NEXT_STEP in the next one, whose action it ignores; DISABLED leaves it to the caller.
+    `final_info`; NEXT_STEP in the next one, whose action it ignores; DISABLED leaves it to the caller. Where a step
+    resets, `info` says what a reset says; all else in it is 0 there, and its mask `_name` false.
 
     Args:
         num_envs: N.
@@ -84,9 +85,9 @@ class TaskVectorEnv(Environment, gymnasium.vector.VectorEnv):
 
     def _start_info(self, begun: np.ndarray) -> dict[str, np.ndarray]:
         """Return what is said of episodes that begin, where `begun`, bool (N,)."""
-        now, info = self.tasks.info(), {}
+        info = {}
         for name, value in self.tasks.start_info.items():
-            info[name], info[f"_{name}"] = np.where(begun, value, now[name]), begun.copy()
+            info[name], info[f"_{name}"] = np.where(begun, value, 0.0), begun.copy()
         return info
 
     def _chosen(self, options: Mapping[str, Any]) -> list[int]:
@@ -132,33 +133,34 @@ class TaskVectorEnv(Environment, gymnasium.vector.VectorEnv):
             )
         tasks.step(np.asarray(actions))
         reward, terminated, truncated = tasks.reward, tasks.terminated, tasks.truncated
-        info: dict[str, Any] = tasks.info()
+        info, final = tasks.info(), {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            ended = terminated | truncated
-            info = self._restart(ended, info) if ended.any() else info
-        elif before.any():  # their step did not count: it is their reset
-            self._begin_anew(before, info)
-            reward[before], terminated[before], truncated[before] = 0.0, False, False
-        if self.autoreset_mode != AutoresetMode.SAME_STEP:
+            begun = terminated | truncated
+            final = self._final(begun, info) if begun.any() else {}
+        else:
+            begun = before  # their step did not count: it is their reset
+            reward[begun], terminated[begun], truncated[begun] = 0.0, False, False
             self._ended = terminated | truncated
-        info |= {f"_{name}": np.ones(self.num_envs, bool) for name in list(info) if not name.startswith(("_", "final"))}
-        return tasks.observation(), reward, terminated, truncated, info
+        for i in np.flatnonzero(begun):
+            tasks.reset(int(i), self._rngs[i])
+        return tasks.observation(), reward, terminated, truncated, self._step_info(info, begun) | final
 
-    def _begin_anew(self, ended: np.ndarray, info: dict[str, Any]) -> None:
-        for i in np.flatnonzero(ended):
-            self.tasks.reset(int(i), self._rngs[i])
+    def _step_info(self, info: dict[str, np.ndarray], begun: np.ndarray) -> dict[str, Any]:
+        """Return what is said of a step, with masks: where an episode has begun, what a reset says and no more."""
+        said = {name: np.where(begun, value.dtype.type(0), value) for name, value in info.items()}
+        masks = {f"_{name}": ~begun for name in info}
         for name, value in self.tasks.start_info.items():
-            info[name] = np.where(ended, value, info[name])
+            said[name][begun], masks[f"_{name}"] = value, np.ones(self.num_envs, bool)
+        return said | masks
 
-    def _restart(self, ended: np.ndarray, info: dict[str, Any]) -> dict[str, Any]:
-        """Reset ended tasks, keeping their last observation and info."""
+    def _final(self, ended: np.ndarray, info: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Return the last observation and info of the tasks that ended."""
         final_obs = np.full(self.num_envs, None, dtype=object)
         final_info = {name: value.copy() for name, value in info.items()}
         final_info |= {f"_{name}": ended.copy() for name in info}
         for i in np.flatnonzero(ended):
             final_obs[i] = self.tasks.observation(i)
-        self._begin_anew(ended, info)
-        return info | {
+        return {
             "final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended.copy(),
         }  # fmt: skip
 
@@ -188,7 +190,7 @@ class TaskVectorEnv(Environment, gymnasium.vector.VectorEnv):
         if self.render_mode is None:
             return None
         self._check_order("render")
-        return tuple(self._picture(i) for i in range(self.num_envs))
+        return tuple(self.tasks.picture(i) for i in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the native threads."""

@@ -164,6 +164,10 @@ class Tasks(Independent):
         """Return their spaces."""
         return {}
 
+    def picture(self, i: int) -> np.ndarray:
+        """Return a picture of task i, uint8 (height, width, 3); a task without one cannot be rendered."""
+        raise NotImplementedError
+
     # What every task has.
 
     def reset(self, i: int, rng: np.random.Generator, **options: Any) -> None:

@@ -1,5 +1,6 @@
 """What the insertion task can be told."""
 
+import math
 from dataclasses import dataclass, field
 
 from contactsafe.core.errors import InvalidInputError
@@ -20,6 +21,10 @@ ACTION = ActionConfig(
     tilt=0.08,
 )
 """At most 30 mm/s sideways, 18 mm/s down, and 0.15 rad/s about each axis."""
+
+
+MAX_START_M = 0.2
+"""Greatest height of the tip above the believed mouth at the start, m."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,10 @@ class InsertionConfig(TaskConfig):
                 f"error_m = {self.error_m}, tilt_rad = {self.tilt_rad}; give at most 0.02 m and 0.2 rad, none negative"
             )
         low, high = self.start_m
-        if not 0.0 <= low <= high <= 0.2:
-            raise InvalidInputError(f"start_m = {self.start_m}; give (low, high) with 0 ≤ low ≤ high ≤ 0.2 m")
+        if not 0.0 <= low <= high <= MAX_START_M:
+            raise InvalidInputError(f"start_m = {self.start_m}; give (low, high) with 0 ≤ low ≤ high ≤ {MAX_START_M} m")
         low, high = self.friction
         if not 0.0 <= low <= high <= 2.0:
             raise InvalidInputError(f"friction = {self.friction}; give (low, high) with 0 ≤ low ≤ high ≤ 2")
+        if not (len(self.mouth) == 3 and all(map(math.isfinite, self.mouth))):
+            raise InvalidInputError(f"mouth = {self.mouth}; give three finite numbers x, y, z, m")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import quat_to_matrix, rotvec_to_quat
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.observation import Observation, target_observation
@@ -15,9 +16,10 @@ from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.fixtures import TipSurface
 from contactsafe.tasks.base.tasks import Tasks
-from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.config import MAX_START_M, InsertionConfig
 from contactsafe.tasks.insertion.figures import EPISODE_METRICS, FIGURES
 from contactsafe.tasks.insertion.observation import ELAPSED, OFFSET, WRENCH
+from contactsafe.tasks.insertion.picture import TopView, paint
 from contactsafe.tasks.insertion.scene import PEG, block, peg_radius, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
@@ -89,12 +91,26 @@ class InsertionTasks(Tasks):
         believed = np.array(config.mouth)
         error = np.array([*rng.uniform(-config.error_m, config.error_m, 2), 0.0])
         tilt = rotvec_to_quat(np.array([*rng.uniform(-config.tilt_rad, config.tilt_rad, 2), 0.0]))
+        friction, height = rng.uniform(*config.friction), rng.uniform(*config.start_m)
+        if "height" in options:
+            height = self._checked_height(options["height"])
         self.worlds.place_fixture(i, "block", believed + error, tilt)
-        self.worlds.set_tip_friction(i, rng.uniform(*config.friction))
+        self.worlds.set_tip_friction(i, friction)
         task["believed"], task["mouth"] = believed, believed + error
         task["axis"] = -quat_to_matrix(tilt)[:, 2]
-        height = finite_array(options.get("height", rng.uniform(*config.start_m)), (), "height")
-        return Pose(believed + np.array([0.0, 0.0, float(height)]), DOWN)
+        return self._start(height)
+
+    def _start(self, height: float) -> Pose:
+        """Return the tool's pose this high above the believed mouth, m."""
+        return Pose(np.add(self.config.mouth, [0.0, 0.0, height]), DOWN)
+
+    def _checked_height(self, height: Any) -> float:
+        """Return a height of the user's own, m, before anything is changed for it."""
+        height = float(finite_array(height, (), "height"))
+        if not 0.0 <= height <= MAX_START_M:
+            raise InvalidInputError(f"height = {height}; give 0 to {MAX_START_M} m above the believed mouth")
+        self.posture_over(self._start(height))
+        return height
 
     def after_reset(self, i: int, rng: np.random.Generator) -> None:
         """Measure and observe for the first time."""
@@ -108,3 +124,10 @@ class InsertionTasks(Tasks):
     def own_info(self) -> dict[str, np.ndarray]:
         """Return how deep the peg is, m, and whether the arm has met table or block."""
         return {"depth_m": self.tasks["depth"].copy(), "arm_touched": self.tasks["failed"] == 1}
+
+    def picture(self, i: int) -> np.ndarray:
+        """Return block, hole and peg from above, uint8 (512, 512, 3)."""
+        task, depth_m = self.tasks[i], self.config.depth_m
+        tip = self.worlds.records[i]["truth"]["position"]
+        places = (task["believed"][:2], task["mouth"][:2], tip[:2])
+        return paint(TopView(*places, self.hole_radius, peg_radius(self.arm, depth_m), task["depth"] / depth_m))

@@ -1,5 +1,6 @@
 """What the wiping task can be told: one frozen dataclass, every field with its unit."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -96,8 +97,16 @@ class WipingConfig(TaskConfig):
     reward: RewardConfig = field(default_factory=RewardConfig)
 
     def __post_init__(self) -> None:
-        """Refuse a kind of board or an image source that cannot be."""
+        """Refuse a start, a kind of board or an image source that cannot be."""
         super().__post_init__()
         check_boards(self.boards)
+        if not 0.0 <= self.clean_fraction < 1.0:
+            raise InvalidInputError(f"clean_fraction = {self.clean_fraction}; give at least 0 and less than 1")
+        low, high = self.start_height
+        if not (0.0 <= low <= high < math.inf and 0.0 <= self.start_reach < math.inf):
+            raise InvalidInputError(
+                f"start_reach = {self.start_reach}, start_height = {self.start_height}; give a reach of 0 m or more, "
+                "and (low, high) with 0 ≤ low ≤ high"
+            )
         if self.image_source not in get_args(ImageSource):
             raise InvalidInputError(f"image_source = {self.image_source!r}; choose mask or photograph")

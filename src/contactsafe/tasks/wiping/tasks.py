@@ -12,7 +12,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, of_object
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.observation import Observation
-from contactsafe.robot.arm import Pose
+from contactsafe.robot.arm import Pose, finite_array
 from contactsafe.sim.config import WorldConfig
 from contactsafe.tasks.base.tasks import Tasks
 from contactsafe.tasks.wiping.board import furnish, pad_half
@@ -24,6 +24,7 @@ from contactsafe.tasks.wiping.ink import nearest_ink
 from contactsafe.tasks.wiping.observation import observation_vectors
 from contactsafe.tasks.wiping.step import OWN_FIELDS, REWARD_TERMS, WEIGHTS, finish, observe, rewards_dtype
 from contactsafe.tasks.wiping.variation import Variation
+from contactsafe.tasks.wiping.whiteboard import square_image
 from contactsafe.tasks.wiping.whiteboards import Whiteboards
 
 
@@ -100,8 +101,10 @@ class WipingTasks(Tasks):
     def begin_episode(self, i: int, rng: np.random.Generator, options: Mapping[str, Any]) -> Pose:
         """Paint board i and sample the tool's start."""
         config, board = self.config, self.boards.boards[i]
-        board.clear()
         drawing, start = options.get("drawing"), options.get("start")
+        start = None if start is None else self._checked_start(start)
+        drawing = None if drawing is None else square_image(drawing)
+        board.clear()
         if drawing is None:
             paint_board(board, config.boards, rng)
         else:
@@ -111,7 +114,15 @@ class WipingTasks(Tasks):
             start = np.add(config.board.centre, [*rng.uniform(-reach, reach, 2), rng.uniform(*config.start_height)])
         if self._variation is not None:
             self._variation.sample(i, rng)
-        return Pose(np.asarray(start, dtype=float), DOWN)
+        return Pose(start, DOWN)
+
+    def _checked_start(self, start: Any) -> np.ndarray:
+        """Return a start of the user's own, (3,), m, before anything is changed for it."""
+        start, lowest = finite_array(start, (3,), "start"), self.config.board.centre[2]
+        if start[2] < lowest:
+            raise InvalidInputError(f"start[2] = {start[2]} m is below the board; give {lowest} m or more")
+        self.posture_over(Pose(start, DOWN))
+        return start
 
     def after_reset(self, i: int, rng: np.random.Generator) -> None:
         """Count the ink and look at the board for the first time."""

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
@@ -55,11 +56,7 @@ class Whiteboard(Independent):
         Raises:
             InvalidInputError: not a square image.
         """
-        drawing = np.asarray(drawing)
-        if drawing.ndim != 2 or drawing.shape[0] != drawing.shape[1] or drawing.shape[0] == 0:
-            raise InvalidInputError(
-                f"drawing has shape {drawing.shape}; give a square image, (n, n), true where ink is"
-            )
+        drawing = square_image(drawing)
         area = self.cells[self._ink_rows, self._ink_columns]
         index = (np.arange(area.shape[0]) + 0.5) * drawing.shape[0] / area.shape[0]
         index = index.astype(int)
@@ -162,3 +159,15 @@ def erase_under_pad(
                 cells[i, j] = 0
                 erased += 1
     return erased
+
+
+def square_image(drawing: ArrayLike) -> np.ndarray:
+    """Return a drawing as an array, (n, n).
+
+    Raises:
+        InvalidInputError: not a square image.
+    """
+    image = np.asarray(drawing)
+    if image.ndim != 2 or image.shape[0] != image.shape[1] or image.shape[0] == 0:
+        raise InvalidInputError(f"drawing has shape {image.shape}; give a square image, (n, n), true where ink is")
+    return image
