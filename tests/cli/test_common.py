@@ -9,7 +9,7 @@ from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.tasks import DEFAULT_TASK
 
 
-@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment disturbance --bundle", "bench --bundle"])
+@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
 def test_a_missing_bundle_is_told(command, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     missing = tmp_path / "nothing"
@@ -59,7 +59,7 @@ def test_a_run_in_place_of_its_bundle_is_told(bundle, tmp_path, capsys):
     assert mistake(capsys, "evaluate", str(tmp_path)) == f"{tmp_path} is a run; give its bundle, {bundle}"
 
 
-@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment disturbance --bundle", "bench --bundle"])
+@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
 def test_a_bundle_of_another_task_is_refused_with_the_option_that_is_missing(command, capsys):
     folder = shipped_bundle("wiping")
     told = mistake(capsys, *command.split(), str(folder), "--task", "insertion")

@@ -94,7 +94,7 @@ def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> E
     )
 
 
-ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, needs_policy=True)
+ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, takes=("task", "bundle"))
 
 
 def force_metrics(trace: np.ndarray) -> dict[str, float]:

@@ -44,7 +44,9 @@ def test_what_is_unknown_is_told_with_what_there_is():
 
 @pytest.mark.parametrize("place", ["press.PressTasks", "press", "press:", ":PressTasks", "a:b:c", "", None])
 def test_a_place_without_a_colon_was_accepted_and_failed_on_unpacking(place):
-    with pytest.raises(InvalidInputError, match="^task 'press': place = .*; give 'module:NAME' of its Task or .*Tasks'$"):
+    with pytest.raises(
+        InvalidInputError, match=r"^task 'press': place = .*; give 'module:NAME' of its Task or .*Tasks'$"
+    ):
         register_task("press", place)
     assert "press" not in TASKS
     assert env_id("press") not in gymnasium.registry
@@ -52,7 +54,7 @@ def test_a_place_without_a_colon_was_accepted_and_failed_on_unpacking(place):
 
 @pytest.mark.parametrize("name", ["Press", "press button", "", 3])
 def test_a_name_that_no_command_can_take_is_refused(name):
-    with pytest.raises(InvalidInputError, match="give a name in lower case, such as 'wiping'$"):
+    with pytest.raises(InvalidInputError, match=r"give a name in lower case, such as 'wiping'$"):
         register_task(name, "press:PressTasks")
 
 
