@@ -1,12 +1,14 @@
 """Bundles that commands are given, and what is said where they are none."""
 
+import gymnasium
 import pytest
 from tests.cli.mistakes import mistake
 
 from contactsafe.cli import common
 from contactsafe.cli.common import task_of
 from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.tasks import DEFAULT_TASK
+from contactsafe.tasks import DEFAULT_TASK, TASKS, register_task
+from contactsafe.tasks.base.registry import env_id
 
 
 @pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
@@ -64,6 +66,17 @@ def test_a_bundle_of_another_task_is_refused_with_the_option_that_is_missing(com
     folder = shipped_bundle("wiping")
     told = mistake(capsys, *command.split(), str(folder), "--task", "insertion")
     assert told == f"{folder} is a policy for the task wiping, not for insertion; give --task wiping"
+
+
+@pytest.mark.parametrize("command", ["demo", "evaluate", "experiment task-safety", "bench"])
+def test_a_task_without_a_shipped_policy_was_told_of_a_folder_in_the_package(command, capsys):
+    try:
+        register_task("press", "contactsafe.tasks.wiping.tasks:WipingTasks")
+        told = mistake(capsys, *command.split(), "--task", "press")
+        assert told == "no policy is shipped for task 'press'; give the folder of a bundle"
+    finally:
+        TASKS.pop("press", None)
+        gymnasium.registry.pop(env_id("press"), None)
 
 
 @pytest.mark.parametrize(
