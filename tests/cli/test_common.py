@@ -9,6 +9,7 @@ from contactsafe.cli.common import task_of
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.tasks import DEFAULT_TASK, TASKS, register_task
 from contactsafe.tasks.base.registry import env_id
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 
 @pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
@@ -68,10 +69,16 @@ def test_a_bundle_of_another_task_is_refused_with_the_option_that_is_missing(com
     assert told == f"{folder} is a policy for the task wiping, not for insertion; give --task wiping"
 
 
+class PressTasks(WipingTasks):
+    """A task of a user's own."""
+
+    name = "press"
+
+
 @pytest.mark.parametrize("command", ["demo", "evaluate", "experiment task-safety", "bench"])
 def test_a_task_without_a_shipped_policy_was_told_of_a_folder_in_the_package(command, capsys):
     try:
-        register_task("press", "contactsafe.tasks.wiping.tasks:WipingTasks")
+        register_task("press", f"{__name__}:PressTasks")
         told = mistake(capsys, *command.split(), "--task", "press")
         assert told == "no policy is shipped for task 'press'; give the folder of a bundle"
     finally:

@@ -8,6 +8,7 @@ from contactsafe.policy.conditions import Conditions
 from contactsafe.tasks import ENGINES, TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.registry import backend_of, env_id, register_task
 from contactsafe.tasks.base.task import Task, TaskOptions
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -65,6 +66,7 @@ def test_a_name_that_no_command_can_take_is_refused(name):
         ("contactsafe.tasks.nowhere:TASK", "cannot be imported: ModuleNotFoundError"),
         ("contactsafe.tasks.wiping.config:WipingConfig", "no Task and no subclass of Tasks; register one"),
         ("contactsafe.tasks.base.registry:ENGINES", "no Task and no subclass of Tasks; register one"),
+        ("contactsafe.tasks.wiping.task:TASK", "calls itself 'wiping'; register it by that name"),
     ],
 )
 def test_a_task_that_is_not_where_it_was_registered_was_a_traceback(place, told):
@@ -78,8 +80,14 @@ def test_a_task_that_is_not_where_it_was_registered_was_a_traceback(place, told)
         gymnasium.registry.pop(env_id("lost"), None)
 
 
-def test_registering_a_subclass_of_tasks_is_enough_and_twice_is_once(monkeypatch):
-    place = "contactsafe.tasks.wiping.tasks:WipingTasks"
+class BareTasks(WipingTasks):
+    """A task of which nothing but the simulation is declared."""
+
+    name = "bare"
+
+
+def test_registering_a_subclass_of_tasks_is_enough_and_twice_is_once():
+    place = f"{__name__}:BareTasks"
     try:
         register_task("bare", place)
         register_task("bare", place)

@@ -89,7 +89,7 @@ def task_by_name(name: str) -> "Task":
     """Import a task.
 
     Raises:
-        InvalidInputError: no task has this name, or it is not where it was registered.
+        InvalidInputError: no task has this name, it is not where it was registered, or calls itself otherwise.
     """
     from contactsafe.tasks.base.task import Task
     from contactsafe.tasks.base.tasks import Tasks
@@ -104,13 +104,14 @@ def task_by_name(name: str) -> "Task":
             f"task '{name}': {TASKS[name]} cannot be imported: {shown(error)}; give register_task the 'module:NAME' of "
             "its Task or of its subclass of Tasks"
         ) from error
-    if isinstance(found, Task):
-        return found
-    if not (isinstance(found, type) and issubclass(found, Tasks)):
+    task = Task(found) if isinstance(found, type) and issubclass(found, Tasks) else found
+    if not isinstance(task, Task):
         raise InvalidInputError(
             f"task '{name}': {TASKS[name]} is {shown(found)}, no Task and no subclass of Tasks; register one"
         )
-    return Task(found)
+    if task.name != name:
+        raise InvalidInputError(f"task '{name}': {TASKS[name]} calls itself '{task.name}'; register it by that name")
+    return task
 
 
 def make_vec(name: str, num_envs: int, config: Any = None, engine: str = "mujoco", **others: Any) -> Any:
