@@ -86,13 +86,13 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> InsertionEpisodes:
         """Return holes, and an obstacle that is moved into the forearm while the peg goes in: the arm itself stays."""
-        probe = InsertionTasks(arm=self.arm)
+        probe = InsertionTasks(self.config, arm=self.arm)
         posture = probe.posture_over(Pose(np.array(probe.config.mouth), DOWN))
         obstacle = obstacle_at(probe.arm, posture)
         x, y, z = obstacle.position
         travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
         coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
-        worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
+        worlds = [self.with_obstacle(coming)] * len(seeds)
         return InsertionEpisodes(self.make_tasks(self.under(controller), seeds, worlds), seeds)
 
     def scripted(
@@ -104,9 +104,9 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         works: bool,
     ) -> tuple[InsertionEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
-        action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
-        config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
-        tasks = self.make_tasks(config, seeds, worlds)
+        action = self.steady_action(stiffness)
+        config = replace(self.under(controller), action=action, error_m=0.0, tilt_rad=0.0)
+        tasks = self.make_tasks(config, seeds, [self.with_errors_of(world) for world in worlds])
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
         return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else hold_still
 
