@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -53,6 +54,10 @@ class InsertionEpisodes(TaskEpisodes):
         open_ = x[:, :, None] ** 2 + y[:, None, :] ** 2 < self.tasks.hole_radius**2
         return np.where(open_, HOLE, 0).astype(np.uint8)
 
+    def worth_showing(self) -> np.ndarray:
+        """Return how far each hole is from where it is believed to be, m, (n,): the further, the longer the search."""
+        return np.linalg.norm(self.tasks.tasks["mouth"] - self.tasks.tasks["believed"], axis=1)
+
 
 class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
     """The insertion task for `contactsafe.experiments.task.ExperimentTask`.
@@ -69,6 +74,12 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         Metric("inserted", "pegs inserted, mean", "%", 100.0, main=True, aim=Aim(at_least=90.0), mean=True),
         Metric("depth_mm", "depth reached", "mm"),
         Metric("time_s", "time to full depth", "s", main=True),
+    )
+    aims: Mapping[str, Aim] = MappingProxyType(
+        {
+            "tool_force_peak_n": Aim(at_most=40.0, always=True),
+            "tool_force_median_n": Aim(at_most=15.0),
+        }
     )
     highlights: tuple[Highlight, ...] = (Highlight("inserting", "inserted", "Pegs inserted, holes never met before"),)
     panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)

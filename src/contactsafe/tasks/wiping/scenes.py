@@ -4,6 +4,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -50,6 +51,10 @@ class WipingEpisodes(TaskEpisodes):
         """Return the boards' cells, uint8 (n, rows, columns), copied."""
         return self.tasks.boards.cells.copy()
 
+    def worth_showing(self) -> np.ndarray:
+        """Return the cells of ink, (n,): a board that one stroke wipes shows little."""
+        return np.count_nonzero(self.tasks.boards.cells, axis=(1, 2))
+
     def timed(self) -> Mapping[str, tuple[Callable[[], object], int]]:
         """Return what is worth timing by itself: the mask."""
         boards, plant = self.tasks.boards, self.worlds.records[0]["plant"]
@@ -80,6 +85,13 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
         Metric("clean", "boards wiped clean, mean", "%", 100.0, main=True, mean=True),
         Metric("time_s", "time to a clean board", "s"),
     )  # fmt: skip
+    aims: Mapping[str, Aim] = MappingProxyType(
+        {
+            "tool_force_peak_n": Aim(at_most=40.0, always=True),  # the paper's
+            "tool_force_median_n": Aim(at_most=10.0, at_least=2.0),
+            "landing_peak_n": Aim(at_most=20.0),
+        }
+    )
     highlights: tuple[Highlight, ...] = (Highlight("wiping", "ink_removed", "Ink wiped off boards never seen before"),)
     panels: tuple[Panel, ...] = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
