@@ -20,7 +20,8 @@ from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.results.experiment import Experiment, to_json
-from contactsafe.tasks import DEFAULT_TASK, place_of, task_by_name
+from contactsafe.tasks import DEFAULT_TASK, task_by_name
+from contactsafe.tasks.base.registry import place_of
 
 
 def _usual_trials() -> str:
