@@ -1,15 +1,18 @@
 """Bundles that commands are given, and what is said where they are none."""
 
+import gymnasium
 import pytest
 from tests.cli.mistakes import mistake
 
 from contactsafe.cli import common
 from contactsafe.cli.common import task_of
 from contactsafe.policy.bundle import shipped_bundle
-from contactsafe.tasks import DEFAULT_TASK
+from contactsafe.tasks import DEFAULT_TASK, TASKS, register_task
+from contactsafe.tasks.base.registry import env_id
+from contactsafe.tasks.wiping.tasks import WipingTasks
 
 
-@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment disturbance --bundle", "bench --bundle"])
+@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
 def test_a_missing_bundle_is_told(command, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     missing = tmp_path / "nothing"
@@ -59,11 +62,28 @@ def test_a_run_in_place_of_its_bundle_is_told(bundle, tmp_path, capsys):
     assert mistake(capsys, "evaluate", str(tmp_path)) == f"{tmp_path} is a run; give its bundle, {bundle}"
 
 
-@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment disturbance --bundle", "bench --bundle"])
+@pytest.mark.parametrize("command", ["demo --bundle", "evaluate", "experiment task-safety --bundle", "bench --bundle"])
 def test_a_bundle_of_another_task_is_refused_with_the_option_that_is_missing(command, capsys):
     folder = shipped_bundle("wiping")
     told = mistake(capsys, *command.split(), str(folder), "--task", "insertion")
     assert told == f"{folder} is a policy for the task wiping, not for insertion; give --task wiping"
+
+
+class PressTasks(WipingTasks):
+    """A task of a user's own."""
+
+    name = "press"
+
+
+@pytest.mark.parametrize("command", ["demo", "evaluate", "experiment task-safety", "bench"])
+def test_a_task_without_a_shipped_policy_was_told_of_a_folder_in_the_package(command, capsys):
+    try:
+        register_task("press", f"{__name__}:PressTasks")
+        told = mistake(capsys, *command.split(), "--task", "press")
+        assert told == "no policy is shipped for task 'press'; give the folder of a bundle"
+    finally:
+        TASKS.pop("press", None)
+        gymnasium.registry.pop(env_id("press"), None)
 
 
 @pytest.mark.parametrize(

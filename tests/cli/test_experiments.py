@@ -2,16 +2,20 @@
 
 import csv
 import json
+import shlex
+import sys
 
+import gymnasium
 import pytest
 from tests.cli.mistakes import mistake
 
 from contactsafe.cli import experiments, main
-from contactsafe.cli.experiments import Options, _config, _run_info, scenes_of
+from contactsafe.cli.experiments import Options, _command, _config, scenes_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.registry import ENTRIES
-from contactsafe.tasks import DEFAULT_TASK, TASKS
+from contactsafe.tasks import DEFAULT_TASK, TASKS, import_task
+from contactsafe.tasks.base.registry import env_id
 from contactsafe.tasks.base.task import Task
 from contactsafe.tasks.wiping.tasks import WipingTasks
 
@@ -21,7 +25,7 @@ def test_a_word_in_place_of_a_number_or_nothing_is_told_plainly(capsys):
     assert capsys.readouterr().err.startswith("contactsafe: --trials: 'x' is not a whole number; ")
 
 
-@pytest.mark.parametrize("command", ["demo", "experiment disturbance"])
+@pytest.mark.parametrize("command", ["demo", "experiment task-safety"])
 def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(command, bundle, tmp_path, capsys):
     (tmp_path / "file").write_text("not a folder")
     out = tmp_path / "file" / "out"
@@ -29,9 +33,9 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(command, b
     assert told == f"cannot write to {out}: not a directory; give a folder you may write to with --out"
 
 
-def test_json_of_an_experiment_is_all_that_is_on_stdout(bundle, capsys):
-    words = "experiment disturbance --trials 1 --controllers vices,safe --seed 4 --json --bundle"
-    assert main([*words.split(), str(bundle)]) == 0
+def test_json_of_an_experiment_is_all_that_is_on_stdout(capsys):
+    words = "experiment disturbance --trials 1 --controllers vices,safe --seed 4 --json"
+    assert main(words.split()) == 0
     out, err = capsys.readouterr()
     summary = json.loads(out, parse_constant=pytest.fail)
     experiment = summary["experiments"]["disturbance"]
@@ -108,10 +112,33 @@ def test_a_preset_with_a_parameter_that_cannot_be_is_told_in_one_line(command, p
 
 @pytest.mark.parametrize("entry", ENTRIES.values(), ids=ENTRIES)
 def test_options_left_out_are_those_of_the_experiment(entry):
-    config = _config(Options(entry.name, plants=("clean",), seed=3), entry)
+    config = _config(Options(entry.name, seed=3), entry)
     assert list(config.seeds) == list(range(3, 3 + entry.trials))
-    assert config.plants == ("clean",)
-    assert (config.bundle is not None) == entry.needs_policy
+    assert (config.bundle is not None) == ("bundle" in entry.takes)
+    assert (config.task is not None) == ("task" in entry.takes)
+
+
+OPTIONS = {"task": "insertion", "bundle": "folder", "plants": "clean", "minutes": "2"}
+
+
+@pytest.mark.parametrize("entry", ENTRIES.values(), ids=ENTRIES)
+@pytest.mark.parametrize("option", OPTIONS)
+def test_an_option_that_an_experiment_does_not_take_was_ignored_and_recorded(entry, option, capsys):
+    assert set(entry.takes) <= set(OPTIONS)
+    if option in entry.takes:
+        return
+    told = mistake(capsys, "experiment", entry.name, f"--{option}", OPTIONS[option])
+    assert told == f"experiment {entry.name} takes no --{option}; leave that out"
+
+
+def test_all_options_that_are_not_taken_are_told_at_once(capsys):
+    told = mistake(capsys, *["experiment", "clock", "--minutes", "3", "--task", "insertion"])
+    assert told == "experiment clock takes no --task and no --minutes; leave that out"
+
+
+def test_an_experiment_without_a_task_was_refused_for_a_task_without_scenes(monkeypatch):
+    monkeypatch.setattr(experiments, "task_by_name", lambda name: Task(WipingTasks))
+    assert _config(Options("collisions"), ENTRIES["collisions"]).task is None
 
 
 def test_trials_that_are_asked_for_count_more_than_the_usual_ones():
@@ -121,10 +148,33 @@ def test_trials_that_are_asked_for_count_more_than_the_usual_ones():
 
 
 def test_the_command_on_the_page_names_what_was_not_the_default():
-    usual = _run_info("contactsafe demo", DEFAULT_TASK, ExperimentConfig(), 1.0)["command"]
+    usual = _command("demo", ExperimentConfig(), DEFAULT_TASK, None)
     assert usual == "contactsafe demo --trials 10 --seed 0 --controllers " + ",".join(ExperimentConfig.controllers)
-    other = _run_info("contactsafe demo", "insertion", ExperimentConfig(minutes=2.5, plants=("real",)), 1.0)["command"]
+    other = _command("demo", ExperimentConfig(minutes=2.5, plants=("real",)), "insertion", None)
     assert other == usual + " --task insertion --plants real --minutes 2.5"
+
+
+def test_the_command_on_the_page_left_the_bundle_out(bundle, tmp_path, capsys):
+    folder = bundle.rename(tmp_path / "my bundle")
+    words = "experiment task-safety --trials 1 --controllers safe --json --bundle"
+    assert main([*words.split(), str(folder)]) == 0
+    command = json.loads(capsys.readouterr().out)["command"]
+    assert shlex.split(command)[-2:] == ["--bundle", str(folder)]
+
+
+def test_the_command_on_the_page_named_a_task_of_ones_own_as_nobody_can_call_it(tmp_path, monkeypatch):
+    (tmp_path / "pressing.py").write_text(
+        "from contactsafe.tasks import register_task\nregister_task('press', 'pressing:PressTasks')\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    try:
+        assert import_task("pressing:press") == "press"
+        assert " --task pressing:press" in _command("demo", ExperimentConfig(), "press", None)
+    finally:
+        sys.modules.pop("pressing", None)
+        TASKS.pop("press", None)
+        gymnasium.registry.pop(env_id("press"), None)
 
 
 @pytest.mark.parametrize("task", TASKS)

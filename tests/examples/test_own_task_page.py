@@ -57,7 +57,7 @@ def test_a_button_held_with_the_stated_force_is_a_success_in_either_engine_and_w
     assert float(words[0][1]) >= 0.5
 
 
-def test_every_command_takes_it_by_module_and_name(folder):
+def test_training_and_evaluation_take_it_by_module_and_name(folder):
     train = ["train", "ppo", "--task", "press:press", "--num-envs", "4", "--rollout-steps", "32", "--batch", "64"]
     status, printed, told = run(
         folder, "-m", "contactsafe", *train, "--total-steps", "256", "--evaluate-episodes", "2", "--out", "run"

@@ -1,5 +1,7 @@
 """A task that no room knows: the target slides to the right whatever the policy says, and success is to be there."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from contactsafe.control import presets
@@ -71,6 +73,9 @@ class ReachingEpisodes:
             picture.flat[: seed + 1] = 1  # the more, the larger its seed
         return cells
 
+    def worth_showing(self):
+        return np.array(self.seeds)
+
     def timed(self):
         return {"nothing": (lambda: None, 10)}
 
@@ -81,6 +86,7 @@ class Reaching:
     name = "reaching"
     policy = "A policy reaches."
     metrics = (Metric("away_mm", "distance reached", "mm", main=True, aim=Aim(at_least=1000 * GOAL_M)),)
+    aims = MappingProxyType({"tool_force_peak_n": Aim(at_most=3.0), "landing_peak_n": Aim(at_most=2.0)})
     highlights = (Highlight("reaching", "away_mm", "Distance reached"),)
     panels = (Panel("distance", "m", lambda run: run.curves["away"]),)
     arm = robots.panda()

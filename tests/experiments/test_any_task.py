@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from tests.experiments.fake_task import GOAL_M, Reaching, ReachingEpisodes
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.disturbance import PUSH_POINTS, disturbance
 from contactsafe.experiments.joint_safety import OBSTACLES, joint_safety
 from contactsafe.experiments.run import run_policy
-from contactsafe.experiments.task_safety import task_safety
+from contactsafe.experiments.task_safety import METRICS, task_safety, with_aims
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 
 TASK = Reaching()
@@ -37,6 +38,14 @@ def test_task_safety_reports_the_tasks_metrics_beside_its_own(task_result):
     assert task_result.figures[0].plots[-1] == TASK.panels
     assert task_result.figures[0].caption.endswith("range; distance.")
     assert (task_result.stage, task_result.policy) == (TASK.stage, TASK.policy)
+
+
+def test_the_aims_of_wiping_judged_every_task(task_result):
+    aims = {metric.name: metric.aim for metric in task_result.metrics if metric.name in [m.name for m in METRICS]}
+    assert {name: aim for name, aim in aims.items() if aim is not None} == dict(TASK.aims)
+    assert all(metric.aim is None for metric in METRICS)
+    with pytest.raises(InvalidInputError, match=r"^the task has aims for force_n; choose from tool_force_peak_n, "):
+        with_aims({"force_n": TASK.aims["tool_force_peak_n"]})
 
 
 def test_task_safety_shows_the_episode_with_most_to_see(task_result):

@@ -28,6 +28,16 @@ def test_bare_physics_is_what_the_others_are_compared_with(measured):
         assert part.ratio == pytest.approx(part.median_us / found[0].median_us)
 
 
+@pytest.mark.parametrize(("sees", "seen"), [(True, "image"), (False, "observation")])
+def test_a_policy_without_a_camera_was_timed_from_image_to_action(sees, seen):
+    episodes = {name: Reaching().episodes("safe", [0]) for name in ("one", "bare", "many")}
+    names = [part.name for part in speed._parts(episodes, None, sees)]
+    assert [name for name in names if name.startswith("policy")] == [
+        f"policy, {seen} to action",
+        f"policy, batch of {speed._ENVS}, per {seen}",
+    ]
+
+
 def test_the_tasks_own_parts_are_timed_too(measured):
     names = [part.name for part in measured[0]]
     assert "nothing" in names

@@ -133,7 +133,8 @@ def task_safety():
     )
     recordings = tuple(record("wiping", name, 8.0) for name in CONTROLLERS)
     return Experiment(
-        "task-safety", "Task safety", "Does the tool press gently?", tuple(found), (*Wiping.metrics, *task.METRICS),
+        "task-safety", "Task safety", "Does the tool press gently?", tuple(found),
+        (*Wiping.metrics, *task.with_aims(Wiping.aims)),
         Wiping.highlights, recordings, (task.curves(Wiping.panels), task.IMPEDANCE), Wiping().stage,
         policy=Wiping.policy,
     )  # fmt: skip

@@ -27,6 +27,7 @@ def load_bundle(folder: Path | None, task: str = DEFAULT_TASK) -> Bundle:
     """Load a bundle from its folder; the one that is shipped for the task where there is no folder.
 
     Raises:
+        BundleError: it cannot be used, or none is shipped.
         InvalidInputError: it is of another task.
     """
     bundle = Bundle.load(folder or shipped_bundle(task))

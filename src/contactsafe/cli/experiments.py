@@ -1,12 +1,13 @@
 """`contactsafe demo` and `contactsafe experiment`."""
 
 import datetime
+import shlex
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import tyro
 
@@ -14,12 +15,13 @@ from contactsafe.cli.common import BundleFolder, Controllers, TaskName, describe
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse, some_of
 from contactsafe.experiments import registry
-from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig
+from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig, Taken
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
+from contactsafe.tasks.base.registry import place_of
 
 
 def _usual_trials() -> str:
@@ -54,7 +56,7 @@ def demo(
     folder = prepare_output(out)
     started = time.monotonic()
     results = _run(registry.PAPER, config)
-    info = _run_info("contactsafe demo", task, config, time.monotonic() - started)
+    info = _run_info(_command("demo", config, task, bundle), config, time.monotonic() - started)
     print(terminal_table(results))
     page = write_report(folder, results, info)
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
@@ -94,8 +96,8 @@ def experiment(arguments: Sequence[str]) -> None:
 
       EXPERIMENTS
 
-    The first two need a policy. A trial depends on its own seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17
-    of any batch once more and draws it.
+    The first two run a policy, the first three a task; the others drive a Panda by scripts. A trial depends on its own
+    seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17 of any batch once more and draws it.
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
     from contactsafe.report.summary import summarise
@@ -106,7 +108,8 @@ def experiment(arguments: Sequence[str]) -> None:
     folder = prepare_output(asked.out) if asked.out else None
     started = time.monotonic()
     results = _run([asked.name], config)
-    info = _run_info(f"contactsafe experiment {asked.name}", asked.task, config, time.monotonic() - started)
+    command = _command(f"experiment {asked.name}", config, asked.task, asked.bundle)
+    info = _run_info(command, config, time.monotonic() - started)
     page = write_report(folder, results, info) if folder else None
     print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
     if page:
@@ -114,10 +117,20 @@ def experiment(arguments: Sequence[str]) -> None:
 
 
 def _config(asked: Options, entry: Entry) -> ExperimentConfig:
-    """Return the configuration of an experiment as it was asked for; the policy is loaded where it needs one."""
+    """Return the configuration of an experiment as it was asked for, with the task and the policy that it takes.
+
+    Raises:
+        InvalidInputError: something was asked for that it does not take.
+    """
+    usual = {field.name: field.default for field in fields(Options)}
+    unread = [
+        f"--{name}" for name in get_args(Taken) if name not in entry.takes and getattr(asked, name) != usual[name]
+    ]
+    if unread:
+        raise InvalidInputError(f"experiment {entry.name} takes no {' and no '.join(unread)}; leave that out")
     trials = entry.trials if asked.trials is None else asked.trials
-    bundle = load_bundle(asked.bundle, asked.task) if asked.bundle or entry.needs_policy else None
-    scenes = scenes_of(asked.task, bundle)
+    bundle = load_bundle(asked.bundle, asked.task) if "bundle" in entry.takes else None
+    scenes = scenes_of(asked.task, bundle) if "task" in entry.takes else None
     return ExperimentConfig(asked.controllers, trials, asked.seed, asked.plants, asked.minutes, scenes, bundle)
 
 
@@ -148,16 +161,24 @@ def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:
     return results
 
 
-def _run_info(command: str, task: str, config: ExperimentConfig, seconds: float) -> dict:
-    words = [command, f"--trials {config.trials} --seed {config.seed} --controllers {','.join(config.controllers)}"]
+def _command(name: str, config: ExperimentConfig, task: str, bundle: Path | None) -> str:
+    """Return a command that runs a configuration again; it names what is not the default."""
+    words = ["contactsafe", *name.split(), "--trials", f"{config.trials}", "--seed", f"{config.seed}"]
+    words += ["--controllers", ",".join(config.controllers)]
     if task != DEFAULT_TASK:
-        words.append(f"--task {task}")
+        words += ["--task", place_of(task)]
+    if bundle is not None:
+        words += ["--bundle", str(bundle)]
     if config.plants != ExperimentConfig.plants:
-        words.append(f"--plants {','.join(config.plants)}")
+        words += ["--plants", ",".join(config.plants)]
     if config.minutes != ExperimentConfig.minutes:
-        words.append(f"--minutes {config.minutes:g}")
+        words += ["--minutes", f"{config.minutes:g}"]
+    return shlex.join(words)
+
+
+def _run_info(command: str, config: ExperimentConfig, seconds: float) -> dict:
     info = {
-        "command": " ".join(words),
+        "command": command,
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "seeds": list(config.seeds),
         "seconds": round(seconds, 1),

@@ -56,6 +56,7 @@ ENTRY = Entry(
     collisions,
     count=lambda config: config.count(len(config.plants)),
     trials=100,
+    takes=("plants",),
 )
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Literal
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
@@ -20,6 +21,9 @@ PLANTS = ("real", "clean")
 
 Progress = Callable[[int], object]
 """Told how many trials were just done."""
+
+Taken = Literal["task", "bundle", "plants", "minutes"]
+"""A field of `ExperimentConfig`, and an option of the command line, that not every experiment takes."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ class Entry:
         run: the experiment, told of every trial done.
         count: how many trials of all controllers a configuration comes to.
         trials: seeds tried where nobody says how many.
-        needs_policy: whether it runs a policy bundle.
+        takes: what it takes beside controllers, trials and seed; a task or bundle that it takes it cannot do without.
     """
 
     name: str
@@ -116,4 +120,4 @@ class Entry:
     run: Callable[[ExperimentConfig, Progress | None], Experiment]
     count: Callable[[ExperimentConfig], int] = ExperimentConfig.count
     trials: int = 10
-    needs_policy: bool = False
+    takes: tuple[Taken, ...] = ()

@@ -81,7 +81,14 @@ def count(config: ExperimentConfig) -> int:
     return len(reporting(config.controllers)) * (2 * config.trials + _stroke_worlds(config.minutes))
 
 
-ENTRY = Entry(NAME, "how soon is a contact reported, where, how often falsely?", detection, count=count, trials=100)
+ENTRY = Entry(
+    NAME,
+    "how soon is a contact reported, where, how often falsely?",
+    detection,
+    count=count,
+    trials=100,
+    takes=("minutes",),
+)
 
 
 def _stroke_worlds(minutes: float) -> int:

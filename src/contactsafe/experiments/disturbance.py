@@ -92,7 +92,11 @@ def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> E
 
 
 ENTRY = Entry(
-    NAME, "somebody leans on the arm with 25 N.", disturbance, count=lambda config: config.count(2 * len(PUSH_POINTS))
+    NAME,
+    "somebody leans on the arm with 25 N.",
+    disturbance,
+    count=lambda config: config.count(2 * len(PUSH_POINTS)),
+    takes=("task",),
 )
 
 

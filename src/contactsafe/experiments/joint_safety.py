@@ -96,7 +96,7 @@ ENTRY = Entry(
     "the forearm runs into an obstacle while the policy works.",
     joint_safety,
     count=lambda config: config.count(len(OBSTACLES)),
-    needs_policy=True,
+    takes=("task", "bundle"),
 )
 
 

@@ -66,7 +66,7 @@ def measure_speed(task: ExperimentTask, bundle: Bundle, progress: Callable[[int]
         progress: told of every round done.
     """
     episodes = {name: task.episodes("safe", range(n)) for name, n in (("one", 1), ("bare", 1), ("many", _ENVS))}
-    parts = _parts(episodes, Policy(bundle, episodes["one"].camera_homography))
+    parts = _parts(episodes, Policy(bundle, episodes["one"].camera_homography), bundle.sees)
     times: dict[str, list[float]] = {part.name: [] for part in parts}
     for timed in (False, *[True] * ROUNDS):
         for of_kind in episodes.values():
@@ -94,10 +94,11 @@ class _Part:
     clock: Callable[[], float] = time.thread_time
 
 
-def _parts(episodes: dict[str, Episodes], policy: Policy) -> list[_Part]:
+def _parts(episodes: dict[str, Episodes], policy: Policy, sees: bool) -> list[_Part]:
     """Return each part, what runs it and how many times that is; bare physics comes first."""
     one, many = episodes["one"], episodes["many"]
     worlds, bare = one.worlds, episodes["bare"].worlds
+    seen = "image" if sees else "observation"
     actions = np.zeros((_ENVS, ACTION_SIZE))
 
     noise = np.random.default_rng(0).standard_normal((_TICKS, noise_channels(one.arm.n)))
@@ -132,8 +133,8 @@ def _parts(episodes: dict[str, Episodes], policy: Policy) -> list[_Part]:
         _Part("control tick, compiled loop", lambda: _ticks(worlds.controllers[0], _TICKS), _TICKS),
         _Part("control tick, called from Python", tick_from_python, _TICKS),
         *(_Part(name, _repeated(run, times), times) for name, (run, times) in one.timed().items()),
-        _Part("policy, image to action", act, 20),
-        _Part(f"policy, batch of {_ENVS}, per image", lambda: policy.act(many.observation()), _ENVS),
+        _Part(f"policy, {seen} to action", act, 20),
+        _Part(f"policy, batch of {_ENVS}, per {seen}", lambda: policy.act(many.observation()), _ENVS),
         _Part(f"environment, {_ENVS} at a time, per step", environment, 10 * _ENVS, time.perf_counter),
     ]
 

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from contactsafe.results.figures import Panel
-from contactsafe.results.metrics import Highlight, Metric
+from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Stage
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
@@ -82,6 +82,10 @@ class Episodes(Protocol):
         """Return what of an episode's step is worth timing by itself: by name, what runs it, and how many times."""
         ...
 
+    def worth_showing(self) -> np.ndarray:
+        """Return how much there is to see in each, as it begins, (n,), 0 or more: the first of the largest is shown."""
+        ...
+
 
 class ExperimentTask(Protocol):
     """A task as experiments see it: episodes begun as they need them, and declarations of what to show.
@@ -90,7 +94,8 @@ class ExperimentTask(Protocol):
         name: what the tool does, as in "push on link 4 while NAME".
         policy: what the learned policy does, in a sentence.
         metrics: of an episode's outcome.
-        highlights: of them, for scenarios named `name`.
+        aims: what metrics of the tool's force should be, by name of `contactsafe.experiments.task_safety.METRICS`.
+        highlights: of its metrics, for scenarios named `name`.
         panels: of its curves, plotted beside the tool's force.
         stage: on which it is filmed.
         arm: that works.
@@ -99,6 +104,7 @@ class ExperimentTask(Protocol):
     name: str
     policy: str
     metrics: tuple[Metric, ...]
+    aims: Mapping[str, Aim]
     highlights: tuple[Highlight, ...]
     panels: tuple[Panel, ...]
     stage: Stage

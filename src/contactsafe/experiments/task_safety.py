@@ -1,10 +1,12 @@
 """Task safety: the policy works on held-out episodes; how strongly does the tool press, and does it work as well?"""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from contactsafe.control.codes import FREE
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.run import policy_for, run_policy
 from contactsafe.results.experiment import Experiment, Trial
@@ -18,15 +20,16 @@ QUESTION = (
     "success?"
 )
 METRICS = (
-    Metric("tool_force_peak_n", "tool force, peak", "N", main=True, aim=Aim(at_most=40.0, always=True)),
-    Metric("tool_force_median_n", "tool force, median in contact", "N", main=True, aim=Aim(at_most=10.0, at_least=2.0)),
+    Metric("tool_force_peak_n", "tool force, peak", "N", main=True),
+    Metric("tool_force_median_n", "tool force, median in contact", "N", main=True),
     Metric("tool_force_p95_n", "tool force, 95th percentile in contact", "N"),
-    Metric("landing_peak_n", "tool force, peak on landing", "N", aim=Aim(at_most=20.0)),
+    Metric("landing_peak_n", "tool force, peak on landing", "N"),
     Metric("stiffness_z_free", "stiffness along z, in the air", "1/s²"),
     Metric("stiffness_z_contact", "stiffness along z, in contact", "1/s²"),
     Metric("damping_z_free", "damping along z, in the air", "1/s"),
     Metric("damping_z_contact", "damping along z, in contact", "1/s"),
 )
+"""Those of any task, which says what they should be: `with_aims`."""
 FORCES = tuple(
     Panel(f"tool force, {axis}", "N", component("tool_force", i), noisy=True) for i, axis in enumerate("xyz")
 )
@@ -54,38 +57,42 @@ _Z = 2
 
 
 def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
-    """Run the experiment; the episode whose first picture shows most is recorded.
+    """Run the experiment; the episode that its task finds most worth showing is recorded.
 
     Args:
         config: controllers, seeds, task and policy bundle.
         progress: told of every trial done.
+
+    Raises:
+        InvalidInputError: there is no task or no policy, or the task has aims for a metric that there is not.
     """
     task, bundle = config.require_task(), config.require_bundle()
+    metrics = (*task.metrics, *with_aims(task.aims))
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for name in config.controllers:
-        most, fullest = 0, None  # cells, recording
+        most, shown = -1.0, None  # of the recording
         for seeds in config.batches():
             episodes = task.episodes(name, seeds)
+            worth = episodes.worth_showing()
             run = run_policy(episodes, policy_for(bundle, episodes).act, episodes.step_limit, to_the_end=False)
             for i, seed in enumerate(seeds):
                 outcome = task.outcome(run.traces[i], run.curves[i], bool(run.succeeded[i]))
                 trials.append(Trial(task.name, name, seed, outcome | force_metrics(run.traces[i])))
-            cells = np.count_nonzero(run.pictures[0], axis=(1, 2))
-            i = int(np.argmax(cells))
-            if cells[i] > most or fullest is None:  # all controllers get the same episodes: the same one of each
-                most, fullest = cells[i], run.recording(i, task.name, name, seeds[i])
+            i = int(np.argmax(worth))
+            if worth[i] > most:  # all controllers get the same episodes: the same one of each
+                most, shown = float(worth[i]), run.recording(i, task.name, name, seeds[i])
             episodes.worlds.close()
             if progress:
                 progress(len(seeds))
-        if fullest is not None:
-            recordings.append(fullest)
+        if shown is not None:
+            recordings.append(shown)
     return Experiment(
         NAME,
         "Task safety",
         QUESTION,
         trials=tuple(trials),
-        metrics=(*task.metrics, *METRICS),
+        metrics=metrics,
         highlights=(*task.highlights, Highlight(task.name, "tool_force_peak_n", "Peak force of the tool")),
         recordings=tuple(recordings),
         figures=(curves(task.panels), IMPEDANCE),
@@ -94,7 +101,19 @@ def task_safety(config: ExperimentConfig, progress: Progress | None = None) -> E
     )
 
 
-ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, needs_policy=True)
+ENTRY = Entry(NAME, "the policy on episodes never seen: tool forces.", task_safety, takes=("task", "bundle"))
+
+
+def with_aims(aims: Mapping[str, Aim]) -> tuple[Metric, ...]:
+    """Return `METRICS` with what a task says that they should be, by name.
+
+    Raises:
+        InvalidInputError: there is no metric of a name.
+    """
+    names = [metric.name for metric in METRICS]
+    if unknown := set(aims) - set(names):
+        raise InvalidInputError(f"the task has aims for {', '.join(sorted(unknown))}; choose from {', '.join(names)}")
+    return tuple(replace(metric, aim=aims.get(metric.name)) for metric in METRICS)
 
 
 def force_metrics(trace: np.ndarray) -> dict[str, float]:

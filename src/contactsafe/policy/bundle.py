@@ -31,8 +31,15 @@ MAX_MODEL_BYTES = 16_000_000
 
 
 def shipped_bundle(task: str) -> Path:
-    """Return the folder of the policy for a task, by its name, that comes with the package."""
-    return Path(str(resources.files("contactsafe.policy") / "bundles" / task))
+    """Return the folder of the policy for a task, by its name, that comes with the package.
+
+    Raises:
+        BundleError: none does.
+    """
+    folder = Path(str(resources.files("contactsafe.policy") / "bundles" / task))
+    if not folder.is_dir():
+        raise BundleError(f"no policy is shipped for task '{task}'; give the folder of a bundle")
+    return folder
 
 
 @dataclass(frozen=True)

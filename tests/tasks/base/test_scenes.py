@@ -1,7 +1,9 @@
 """Scenes of a task under the experiments: what those of all tasks have in common."""
 
 import pytest
+from numpy.testing import assert_array_equal
 
+from contactsafe.experiments.task_safety import with_aims
 from contactsafe.robot import robots
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import bottle
@@ -20,6 +22,21 @@ def test_a_task_is_seen_as_configured_with_the_controller_that_is_compared(kind)
     assert scenes.config.controller == "safe"
     assert scenes.stage.arm is scenes.arm.description
     assert scenes.stage.tool is scenes.arm.tool
+
+
+@pytest.mark.parametrize("kind", [Wiping, Insertion])
+def test_a_task_says_what_its_forces_should_be_and_which_episode_is_worth_showing(kind):
+    declared = {metric.name: metric.aim for metric in with_aims(kind.aims)}
+    assert declared["tool_force_median_n"].at_most == {"wiping": 10.0, "inserting": 15.0}[kind.name]
+    assert (declared["landing_peak_n"] is None) == (kind is Insertion)
+    episodes = kind().episodes("safe", [0, 1, 2])
+    worth = episodes.worth_showing()
+    assert worth.shape == (3,)
+    assert len(set(worth)) == 3
+    assert (worth >= 0).all()
+    episodes.begin()
+    assert_array_equal(episodes.worth_showing(), worth)
+    episodes.worlds.close()
 
 
 def test_there_is_one_task_a_seed_in_a_world_of_its_own_with_the_arm_that_works():

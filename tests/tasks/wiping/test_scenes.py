@@ -1,15 +1,17 @@
 """The wiping task as experiments see it: the same boards for all controllers, a lure, strokes on the board."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.robot import robots
-from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.config import NO_NOISE, PlantConfig, WorldConfig
 from contactsafe.sim.obstacles import bottle
 from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.config import WipingConfig
-from contactsafe.tasks.wiping.scenes import LURE_CENTRE, LURE_SIZE, OBSTACLE_AT, Wiping, held_out, strokes
+from contactsafe.tasks.wiping.scenes import LURE_AT, LURE_SIZE, OBSTACLE_AT, Wiping, held_out, strokes
 from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
 TASK = Wiping()
@@ -52,7 +54,7 @@ def test_the_lure_lies_on_the_right_and_the_tool_starts_on_the_left():
         board = BoardConfig()
         low = np.array(board.centre[:2]) - np.array(board.size) / 2
         centre = low + (cells.mean(axis=0) + 0.5) * board.cell
-        np.testing.assert_allclose(centre, LURE_CENTRE, atol=board.cell)
+        np.testing.assert_allclose(centre, np.add(board.centre[:2], LURE_AT), atol=board.cell)
         assert len(cells) == pytest.approx(np.prod(LURE_SIZE) / board.cell**2, rel=0.05)
         assert (pictures == INK).any()
         assert pose[1] > -0.01
@@ -75,6 +77,47 @@ def test_scenes_of_another_arm_were_those_of_the_panda():
         assert episodes.arm is arm
         episodes.worlds.close()
     assert seen == [arm]
+
+
+def test_scenes_of_another_board_and_plant_were_in_the_places_and_the_world_of_the_default_ones():
+    config = WipingConfig(
+        board=BoardConfig(centre=(0.47, 0.03, 0.02)),
+        world=WorldConfig(PlantConfig(payload_kg=0.2), obstacles=(far_away(None, None),)),
+        action=ActionConfig(translation=(0.006, 0.006, 0.002), gains="low"),
+        clean_fraction=0.01,
+    )
+    task, board, seen = Wiping(config), config.board, []
+
+    def obstacle_at(arm, q):
+        seen.append(arm.tool_pose(q).position)
+        return bottle((0.3, -0.6, 0.7))
+
+    episodes = task.towards_obstacle("vices", range(3), obstacle_at)
+    assert episodes.tasks.config == replace(config, controller="vices")
+    for pictures, pose, met in zip(episodes.pictures(), episodes.observation()["pose"], seen, strict=True):
+        low = np.array(board.centre[:2]) - np.array(board.size) / 2
+        lure = low + (np.argwhere(pictures == OBJECT).mean(axis=0) + 0.5) * board.cell
+        np.testing.assert_allclose(lure, np.add(board.centre[:2], LURE_AT), atol=board.cell)
+        assert OBSTACLE_AT[0] - 1e-3 <= met[1] - board.centre[1] <= OBSTACLE_AT[1] + 1e-3
+        np.testing.assert_allclose([met[0], met[2]], [board.centre[0], board.centre[2]], atol=1e-3)
+        assert -0.01 < pose[1] - board.centre[1] < 0.11
+    for world in episodes.worlds.configs:
+        assert world.plant == config.world.plant
+        assert world.obstacles == (bottle((0.3, -0.6, 0.7)), far_away(None, None))
+    episodes.worlds.close()
+
+    sensed = WorldConfig(PlantConfig(payload_kg=0.1), NO_NOISE)
+    episodes, _ = task.scripted("vices", [0], [sensed], STIFFNESS, works=True)
+    action = replace(
+        config.action, gains="learned", stiffness_start=STIFFNESS, press=episodes.tasks.config.action.press
+    )
+    assert episodes.tasks.config == replace(config, controller="vices", action=action)
+    world = episodes.worlds.configs[0]
+    assert (world.plant, world.sensors) == (sensed.plant, sensed.sensors)
+    assert world.obstacles == config.world.obstacles
+    np.testing.assert_allclose(episodes.observation()["pose"][0, :2], board.centre[:2], atol=1e-3)
+    np.testing.assert_allclose(episodes.observation()["target"][0, 6:12], STIFFNESS)
+    episodes.worlds.close()
 
 
 @pytest.mark.parametrize("works", [False, True])

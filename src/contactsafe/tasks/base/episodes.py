@@ -95,3 +95,7 @@ class TaskEpisodes(Independent):
     def timed(self) -> Mapping[str, tuple[Callable[[], object], int]]:
         """Return what of a step is worth timing by itself: nothing."""
         return {}
+
+    def worth_showing(self) -> np.ndarray:
+        """Return how much there is to see in each, (n,): in one as much as in another."""
+        return np.zeros(self.worlds.n)

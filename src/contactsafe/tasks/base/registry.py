@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import re
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 TASKS: dict[str, str] = {}
 """Where every task is, by its name; see `register_task`."""
 
+_IMPORTED: dict[str, str] = {}  # tasks that were named as module:name, by name
+
 ENGINES = ("mujoco", "pybullet")
 """What may compute the physics of a task."""
 
@@ -26,7 +29,17 @@ def register_task(name: str, place: str) -> None:
     Args:
         name: lower case, such as 'wiping'.
         place: 'module:NAME' of its `Task`, or of its subclass of `Tasks`, which is then a Task with all defaults.
+
+    Raises:
+        InvalidInputError: the name or the place is not of that form; what is there is seen when it is first asked for.
     """
+    if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+        raise InvalidInputError(f"task {shown(name)}: give a name in lower case, such as 'wiping'")
+    if not isinstance(place, str) or not re.fullmatch(r"[\w.]+:\w+", place):
+        raise InvalidInputError(
+            f"task '{name}': place = {shown(place)}; give 'module:NAME' of its Task or of its subclass of Tasks, such "
+            f"as '{name}:{name.capitalize()}Tasks'"
+        )
     TASKS[name] = place
     if env_id(name) not in gymnasium.registry:
         gymnasium.register(
@@ -58,7 +71,13 @@ def import_task(place: str) -> str:
         sys.path.remove(os.getcwd())
     if name not in TASKS:
         raise InvalidInputError(f"task '{place}': {module} registers no task '{name}'; it needs register_task")
+    _IMPORTED[name] = place
     return name
+
+
+def place_of(name: str) -> str:
+    """Return what the command line calls a task: its name, or module:name where it was imported so."""
+    return _IMPORTED.get(name, name)
 
 
 def env_id(name: str) -> str:
@@ -70,15 +89,29 @@ def task_by_name(name: str) -> "Task":
     """Import a task.
 
     Raises:
-        InvalidInputError: no task has this name.
+        InvalidInputError: no task has this name, it is not where it was registered, or calls itself otherwise.
     """
     from contactsafe.tasks.base.task import Task
+    from contactsafe.tasks.base.tasks import Tasks
 
     if name not in TASKS:
         raise InvalidInputError(f"task '{name}' is unknown; choose from {', '.join(TASKS)}")
     module, attribute = TASKS[name].split(":")
-    found = getattr(importlib.import_module(module), attribute)
-    return found if isinstance(found, Task) else Task(found)
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except Exception as error:
+        raise InvalidInputError(
+            f"task '{name}': {TASKS[name]} cannot be imported: {shown(error)}; give register_task the 'module:NAME' of "
+            "its Task or of its subclass of Tasks"
+        ) from error
+    task = Task(found) if isinstance(found, type) and issubclass(found, Tasks) else found
+    if not isinstance(task, Task):
+        raise InvalidInputError(
+            f"task '{name}': {TASKS[name]} is {shown(found)}, no Task and no subclass of Tasks; register one"
+        )
+    if task.name != name:
+        raise InvalidInputError(f"task '{name}': {TASKS[name]} calls itself '{task.name}'; register it by that name")
+    return task
 
 
 def make_vec(name: str, num_envs: int, config: Any = None, engine: str = "mujoco", **others: Any) -> Any:

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Generic, TypeVar
 
+from contactsafe.policy.action_config import LEARNED_GAINS, ActionConfig
 from contactsafe.results.recording import Colour, Stage
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.obstacles import Obstacle
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.tasks import Tasks
 
@@ -39,6 +41,18 @@ class TaskScenes(Generic[T, C]):
     def under(self, controller: str) -> C:
         """Return the task's configuration with another controller."""
         return replace(self.config, controller=controller)
+
+    def steady_action(self, stiffness: Sequence[float]) -> ActionConfig:
+        """Return how actions of a script move the target, which leave K1 as it is, (6,) 1/s²."""
+        return replace(self.config.action, stiffness_start=tuple(stiffness), gains=LEARNED_GAINS)  # type: ignore[arg-type]
+
+    def with_obstacle(self, obstacle: Obstacle) -> WorldConfig:
+        """Return the task's world with an obstacle in it, before those that it has."""
+        return replace(self.config.world, obstacles=(obstacle, *self.config.world.obstacles))
+
+    def with_errors_of(self, world: WorldConfig) -> WorldConfig:
+        """Return the task's world with plant and sensors of another."""
+        return replace(self.config.world, plant=world.plant, sensors=world.sensors)
 
     def make_tasks(self, config: C, seeds: Sequence[int], worlds: Sequence[WorldConfig] | None = None) -> T:
         """Make one task a seed, each in a world of its own where they are given."""

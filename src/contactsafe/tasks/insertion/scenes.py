@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -53,6 +54,10 @@ class InsertionEpisodes(TaskEpisodes):
         open_ = x[:, :, None] ** 2 + y[:, None, :] ** 2 < self.tasks.hole_radius**2
         return np.where(open_, HOLE, 0).astype(np.uint8)
 
+    def worth_showing(self) -> np.ndarray:
+        """Return how far each hole is from where it is believed to be, m, (n,): the further, the longer the search."""
+        return np.linalg.norm(self.tasks.tasks["mouth"] - self.tasks.tasks["believed"], axis=1)
+
 
 class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
     """The insertion task for `contactsafe.experiments.task.ExperimentTask`.
@@ -70,6 +75,12 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         Metric("depth_mm", "depth reached", "mm"),
         Metric("time_s", "time to full depth", "s", main=True),
     )
+    aims: Mapping[str, Aim] = MappingProxyType(
+        {
+            "tool_force_peak_n": Aim(at_most=40.0, always=True),
+            "tool_force_median_n": Aim(at_most=15.0),
+        }
+    )
     highlights: tuple[Highlight, ...] = (Highlight("inserting", "inserted", "Pegs inserted, holes never met before"),)
     panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)
 
@@ -86,13 +97,13 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> InsertionEpisodes:
         """Return holes, and an obstacle that is moved into the forearm while the peg goes in: the arm itself stays."""
-        probe = InsertionTasks(arm=self.arm)
+        probe = InsertionTasks(self.config, arm=self.arm)
         posture = probe.posture_over(Pose(np.array(probe.config.mouth), DOWN))
         obstacle = obstacle_at(probe.arm, posture)
         x, y, z = obstacle.position
         travel = (0.0, COMES_FROM_M + GOES_ON_M, 0.0)
         coming = replace(obstacle, position=(x, y - COMES_FROM_M, z), travel=travel, travel_s=COMES_S)
-        worlds = [WorldConfig(obstacles=(coming,))] * len(seeds)
+        worlds = [self.with_obstacle(coming)] * len(seeds)
         return InsertionEpisodes(self.make_tasks(self.under(controller), seeds, worlds), seeds)
 
     def scripted(
@@ -104,9 +115,9 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
         works: bool,
     ) -> tuple[InsertionEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return holes where they are believed to be, and a script: straight in, or nothing just above the block."""
-        action = replace(InsertionConfig.action, stiffness_start=tuple(stiffness))  # type: ignore[arg-type]
-        config = InsertionConfig(controller=controller, action=action, error_m=0.0, tilt_rad=0.0)
-        tasks = self.make_tasks(config, seeds, worlds)
+        action = self.steady_action(stiffness)
+        config = replace(self.under(controller), action=action, error_m=0.0, tilt_rad=0.0)
+        tasks = self.make_tasks(config, seeds, [self.with_errors_of(world) for world in worlds])
         begin = functools.partial(InsertionTasks.reset, height=_ABOVE_M)
         return InsertionEpisodes(tasks, seeds, begin), straight_in(config) if works else hold_still
 

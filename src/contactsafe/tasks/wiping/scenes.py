@@ -3,6 +3,8 @@
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -24,11 +26,11 @@ from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.tasks import WipingTasks
 from contactsafe.tasks.wiping.whiteboard import INK, OBJECT
 
-LURE_CENTRE, LURE_SIZE = (0.5, -0.24), (0.10, 0.06)
-"""A dark object on the right of the board, unknown to the policy, which takes it for ink; m."""
+LURE_AT, LURE_SIZE = (0.0, -0.24), (0.10, 0.06)
+"""A dark object on the right of the board, unknown to the policy, which takes it for ink; from its centre, m."""
 
 OBSTACLE_AT = (-0.12, -0.06)
-"""Range of the tool's y at which the forearm meets the obstacle, m."""
+"""Range of the tool's y at which the forearm meets the obstacle, from the board's centre, m."""
 
 _HOLD_HEIGHT = 0.06  # m above the board
 _PRESS = 0.004  # depth of x_d below the board while wiping, m
@@ -48,6 +50,10 @@ class WipingEpisodes(TaskEpisodes):
     def pictures(self) -> np.ndarray:
         """Return the boards' cells, uint8 (n, rows, columns), copied."""
         return self.tasks.boards.cells.copy()
+
+    def worth_showing(self) -> np.ndarray:
+        """Return the cells of ink, (n,): a board that one stroke wipes shows little."""
+        return np.count_nonzero(self.tasks.boards.cells, axis=(1, 2))
 
     def timed(self) -> Mapping[str, tuple[Callable[[], object], int]]:
         """Return what is worth timing by itself: the mask."""
@@ -79,6 +85,13 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
         Metric("clean", "boards wiped clean, mean", "%", 100.0, main=True, mean=True),
         Metric("time_s", "time to a clean board", "s"),
     )  # fmt: skip
+    aims: Mapping[str, Aim] = MappingProxyType(
+        {
+            "tool_force_peak_n": Aim(at_most=40.0, always=True),  # the paper's
+            "tool_force_median_n": Aim(at_most=10.0, at_least=2.0),
+            "landing_peak_n": Aim(at_most=20.0),
+        }
+    )
     highlights: tuple[Highlight, ...] = (Highlight("wiping", "ink_removed", "Ink wiped off boards never seen before"),)
     panels: tuple[Panel, ...] = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
@@ -95,9 +108,8 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> WipingEpisodes:
         """Return boards with a lure on the right, begun on the left, and an obstacle between."""
-        probe, rngs = WipingTasks(WipingConfig(), arm=self.arm), [held_out(seed) for seed in seeds]
-        obstacles = [obstacle_at(probe.arm, meeting_posture(probe, rng)) for rng in rngs]
-        worlds = [WorldConfig(obstacles=(obstacle,)) for obstacle in obstacles]
+        probe, rngs = WipingTasks(self.config, arm=self.arm), [held_out(seed) for seed in seeds]
+        worlds = [self.with_obstacle(obstacle_at(probe.arm, meeting_posture(probe, rng))) for rng in rngs]
         tasks = self.make_tasks(self.under(controller), seeds, worlds)
         return WipingEpisodes(tasks, seeds, _lured, rngs)
 
@@ -110,8 +122,9 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
         works: bool,
     ) -> tuple[WipingEpisodes, Callable[[dict[str, np.ndarray]], np.ndarray]]:
         """Return boards and a script: strokes, or nothing just above the board."""
-        action = ActionConfig(stiffness_start=tuple(stiffness), press=_PRESS)  # type: ignore[arg-type]
-        tasks = self.make_tasks(WipingConfig(controller=controller, action=action), seeds, worlds)
+        action = replace(self.steady_action(stiffness), press=_PRESS)
+        config = replace(self.under(controller), action=action)
+        tasks = self.make_tasks(config, seeds, [self.with_errors_of(world) for world in worlds])
         x, y, z = tasks.config.board.centre
         start = np.array([x, y, z + (_ABOVE if works else _HOLD_HEIGHT)])
         episodes = WipingEpisodes(tasks, seeds, functools.partial(WipingTasks.reset, start=start))
@@ -128,15 +141,15 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
 
 def meeting_posture(tasks: WipingTasks, rng: np.random.Generator) -> np.ndarray:
     """Sample joint positions at which the forearm meets the obstacle on the tool's path to the lure, (n,), rad."""
-    x, _, z = tasks.config.board.centre
-    return tasks.posture_over(Pose(np.array([x, rng.uniform(*OBSTACLE_AT), z]), DOWN))
+    x, y, z = tasks.config.board.centre
+    return tasks.posture_over(Pose(np.array([x, y + rng.uniform(*OBSTACLE_AT), z]), DOWN))
 
 
 def _lured(tasks: WipingTasks, i: int, rng: np.random.Generator) -> None:
     x, y, z = tasks.config.board.centre
     # On the left half of the board: never beyond the obstacle to begin with.
     tasks.reset(i, rng, start=(x + rng.uniform(-0.1, 0.1), y + rng.uniform(0.0, 0.1), z + 0.05))
-    tasks.boards.boards[i].place_object(LURE_CENTRE, LURE_SIZE)
+    tasks.boards.boards[i].place_object((x + LURE_AT[0], y + LURE_AT[1]), LURE_SIZE)
     tasks.observe(i)
 
 
