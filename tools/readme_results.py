@@ -3,8 +3,8 @@
 Its rows are the highlights that the experiments declare.
 """
 
+import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,9 @@ def _cell(spread: dict[str, float], metric: dict[str, Any]) -> str:
 
 def main() -> None:
     """Rewrite README.md from the summary named on the command line."""
-    summary = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("summary", type=Path, help="summary.json of `make demo`")
+    summary = json.loads(parser.parse_args().summary.read_text(encoding="utf-8"))
     readme = Path(__file__).parents[1] / "README.md"
     text = readme.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)

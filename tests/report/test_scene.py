@@ -109,7 +109,8 @@ def test_the_visible_faces_of_a_tip_cover_its_outline_once(tool, azimuth, elevat
     outline = ConvexHull(seen[..., :2].reshape(-1, 2)).volume
     faces = visible_faces(seen)
     assert sum(polygon_area(face) for face in faces) == pytest.approx(outline)
-    assert len(faces) <= (3 if tool is WIPER else 2)
+    seen_edge_on = 1e-9  # of the outline: rounding decides whether such a face is there
+    assert sum(polygon_area(face) > seen_edge_on * outline for face in faces) <= (3 if tool is WIPER else 2)
 
 
 def polygon_area(outline):

@@ -25,6 +25,7 @@ FORCE_N = (10.0, 60.0)
 NAMED_AFTER_MS = 30
 """When the reported link is looked at, since the onset."""
 
+_TOUCHING_M = 1e-6  # rounding: a point of the surface is this far within it at most
 _LEVER_M = 0.03  # least joint torque of a newton for a step: 3 N m take at most 100 N
 _AFTER_STEPS = 4  # policy steps recorded from the onset on: 66 or 67 ms
 
@@ -69,7 +70,8 @@ def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str
         point, normal = sample_surface_point(arm, link, rng)
         size = math.exp(rng.uniform(*np.log(FORCE_N)))
         place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal
-        if clearance(arm, q[None], place - 1e-3 * inwards) < 0.5e-3:
+        covered = clearance(arm, q[None], place) < -_TOUCHING_M  # by another link
+        if covered or clearance(arm, q[None], place - 1e-3 * inwards) < 0.5e-3:
             continue
         torque = point_torque(origins[0], rotations[0], link, place, inwards)
         if scenario == STEP:

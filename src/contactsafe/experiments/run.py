@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contactsafe.core.errors import BundleError
 from contactsafe.experiments.task import Act, Episodes
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
 from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ
+from contactsafe.tasks.base.evaluation import check_rate
 
 
 @dataclass(frozen=True)
@@ -107,11 +107,8 @@ def policy_for(bundle: Bundle, episodes: Episodes) -> Policy:
     """Return the policy of a bundle for these episodes.
 
     Raises:
-        BundleError: it was trained for another rate.
+        InvalidInputError: it was trained for another rate.
     """
-    if bundle.rate_hz != POLICY_RATE_HZ:
-        raise BundleError(
-            f"{bundle.folder} acts at {bundle.rate_hz:g} Hz; experiments run at {POLICY_RATE_HZ} Hz: give a bundle "
-            "trained so"
-        )
-    return Policy(bundle, episodes.camera_homography)
+    policy = Policy(bundle, episodes.camera_homography)
+    check_rate(policy)
+    return policy

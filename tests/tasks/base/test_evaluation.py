@@ -49,6 +49,18 @@ def test_a_good_policy_cleans_and_an_idle_one_does_not():
     assert all(record["time_s"] == 1.0 for record in idle["records"])
 
 
+@pytest.mark.parametrize(("trained", "steps"), [(30.0, 60.0), (60.0, 30.0)])
+def test_a_policy_trained_for_another_rate_is_refused_before_it_moves_anything(trained, steps):
+    env = FakeWiping(2)
+    policy = Seeker(env)
+    policy.rate_hz = trained
+    told = f"the policy acts at {trained:g} Hz, the environment steps at {steps:g} Hz; give a policy trained so"
+    with pytest.raises(InvalidInputError, match=told):
+        evaluate_policy(policy, env, 2, seed=0, rate_hz=steps)
+    assert policy.calls == 0
+    assert evaluate_policy(policy, env, 2, seed=0, rate_hz=trained)["episodes"] == 2
+
+
 def test_same_seed_same_figures():
     env = FakeWiping(3)
     first, second, other = (evaluate_policy(Seeker(env), env, 6, seed=s) for s in (1, 1, 2))

@@ -75,6 +75,7 @@ class Environment(Independent):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
+        """Keep a copy: Gymnasium's registry is not to be changed."""
         self._spec = copy.copy(spec)
         if self._spec is not None and self._spec.max_episode_steps is None:
             self._spec.max_episode_steps = self.tasks.step_limit

@@ -55,6 +55,19 @@ def figures_of(env: Any) -> tuple[Figure, ...]:
     return tuple(getattr(getattr(env, "unwrapped", env), "figures", FIGURES))
 
 
+def check_rate(policy: Actor, rate_hz: float = POLICY_RATE_HZ) -> None:
+    """Refuse a policy that was trained to be asked more or less often than it will be.
+
+    Raises:
+        InvalidInputError: so it is.
+    """
+    trained = getattr(policy, "rate_hz", rate_hz)
+    if trained != rate_hz:
+        raise InvalidInputError(
+            f"the policy acts at {trained:g} Hz, the environment steps at {rate_hz:g} Hz; give a policy trained so"
+        )
+
+
 def evaluate_policy(
     policy: Actor,
     vec_env: VectorEnv,
@@ -68,8 +81,8 @@ def evaluate_policy(
     Each environment runs the same number of episodes, so short ones are not counted more often than long ones.
 
     Args:
-        policy: has `act(observation)` for a batch; where it keeps something in mind, `begin(i)` is called as an
-            episode of environment i begins.
+        policy: has `act(observation)` for a batch, and perhaps the `rate_hz` at which it is to be asked; where it
+            keeps something in mind, `begin(i)` is called as an episode of environment i begins.
         vec_env: with AutoresetMode.SAME_STEP; its info has tool_force_n, is_success and what its metrics read.
         episodes: to run in all; rounded up to a multiple of vec_env.num_envs.
         seed: of the first reset; use one that training did not.
@@ -81,13 +94,15 @@ def evaluate_policy(
         episode, by environment and then by time.
 
     Raises:
-        InvalidInputError: episodes is below 1, or the environment resets otherwise.
+        InvalidInputError: episodes is below 1, the environment resets otherwise, or the policy was trained for
+            another rate.
     """
     mode = vec_env.metadata.get("autoreset_mode")
     if mode != AutoresetMode.SAME_STEP:
         raise InvalidInputError(f"the environment resets by {mode}; make it with AutoresetMode.SAME_STEP")
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
+    check_rate(policy, rate_hz)
     run = _Run(policy, vec_env, -(-episodes // vec_env.num_envs), rate_hz, on_episode)
     run.reset(seed)
     while run.active.any():
