@@ -10,6 +10,7 @@ each learns is what `benchmarks/learning_curves.py` says of the same folders.
 """
 
 import argparse
+import hashlib
 import json
 import subprocess
 import sys
@@ -38,17 +39,16 @@ def contactsafe(*words: str) -> str:
 
 
 def train(task: str, out: Path, words: tuple[str, ...], seed: int, more: list[str]) -> None:
-    """Train one policy, or go on with it, unless it is done."""
-    if (out / "bundle" / "bundle.json").exists():
-        return
+    """Train one policy, or go on with it; one that is done has no steps left and is written again as it was."""
     resume = ("--resume",) if (out / "checkpoint.pt").exists() else ()
     common = ("--task", task, "--seed", str(seed), "--out", str(out), "--evaluate-episodes", "0")
     contactsafe("train", "ppo", *common, *words, *more, *resume)
 
 
 def evaluate(task: str, bundle: Path, episodes: int) -> dict:
-    """Evaluate a policy, once: what was found is kept beside it."""
-    kept = bundle.parent / f"evaluation-{episodes}.json"
+    """Evaluate a policy, once: what was found is kept beside it, under the digest of its bundle."""
+    digest = hashlib.sha256((bundle / "bundle.json").read_bytes()).hexdigest()[:12]
+    kept = bundle.parent / f"evaluation-{episodes}-{digest}.json"
     if not kept.exists():
         printed = contactsafe("evaluate", str(bundle), "--task", task, "--episodes", str(episodes), "--json")
         kept.write_text(printed, encoding="utf-8")
@@ -78,7 +78,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", choices=tuple(VARIANTS), default=tuple(VARIANTS))
     options, more = parser.parse_known_args()
     runs = {
-        (name, seed): options.out / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}"
+        (name, seed): options.out / options.task / f"{name.replace(', ', '-').replace(' ', '-')}-{seed}"
         for name in options.only
         for seed in range(options.seeds)
     }
