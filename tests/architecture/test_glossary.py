@@ -15,7 +15,7 @@ SOURCES = [
 TEXTS = {path: path.read_text(encoding="utf-8") for path in SOURCES if path.suffix in (".py", ".md", ".html", ".js")}
 
 INSTEAD = {
-    "detection, isolation, identification, classification": "locating judging",
+    "detection, isolation, identification, classification": "locating judge judges judged judging",
     "impact; peak regression; larger force; acceptance criteria": "blow blows harder bars",
     "identify, estimate (a mass)": "weigh weighs weighed weighing unweighed",
     "surface": "skin",

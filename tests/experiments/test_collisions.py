@@ -70,6 +70,8 @@ def test_what_replays_a_trial_is_a_command_for_presets_and_python_for_others(bat
     own = {"vices": presets.vices(), "softer": presets.safe().with_(contact_force_limit_comply_n=8.0)}
     (row,) = run_battery(own, [3], ["clean"]).tables[1].as_records()
     assert row["replay"] == "run_battery(controllers, [3])"
+    (row,) = run_battery(own, [3], ["clean"], arm=robots.fr3()).tables[1].as_records()
+    assert row["replay"] == "run_battery(controllers, [3], arm=arm)"
 
 
 @pytest.mark.parametrize("case", [({}, [0], ["real"]), (TWO, [], ["real"]), (TWO, [0], []), (TWO, [0], ["wet"])])

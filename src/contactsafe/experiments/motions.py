@@ -7,9 +7,10 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.experiments.collision_motions import TARGET_OFFSET_MAX_M, Motion
+from contactsafe.policy.rate import ticks_of_step
 from contactsafe.robot.ik import solve_ik
 from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.worlds import MAX_TICKS, Worlds, ticks_of_step
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 
 class Playback(Independent):

@@ -11,11 +11,12 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.experiments.collision_motions import sample_motion, scene_rng
 from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.surfaces import clearance, sample_surface_point
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.experiment import Trial
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import link_frames
 from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ, Worlds
+from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 STEP, CONTACT = "step of 3 N m", "contact of 10 to 60 N"
 STEP_NM = 3.0

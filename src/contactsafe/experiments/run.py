@@ -7,9 +7,10 @@ import numpy as np
 from contactsafe.experiments.task import Act, Episodes
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.worlds import MAX_TICKS, POLICY_RATE_HZ
+from contactsafe.sim.worlds import MAX_TICKS
 from contactsafe.tasks.base.evaluation import check_rate
 
 

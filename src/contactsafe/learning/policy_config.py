@@ -12,6 +12,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import one_of
 from contactsafe.policy.action_config import GAINS
 from contactsafe.policy.conditions import Conditions
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.tasks import DEFAULT_TASK, TASKS, task_by_name
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ class PolicyConfig:
     dither: float = 0.3
     reward_scale: float = 1.0
     observes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
-    rate_hz: tyro.conf.Suppress[float] = 60.0
+    rate_hz: tyro.conf.Suppress[float] = float(POLICY_RATE_HZ)
     evaluate_episodes: int = 64
     seed: int = 0
     threads: int = 1

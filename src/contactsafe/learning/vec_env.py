@@ -6,7 +6,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
 from contactsafe.core.copying import Independent
@@ -16,7 +16,7 @@ from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling
 from contactsafe.policy.perception import Perception
-from contactsafe.tasks.base.evaluation import episode_metrics, step_values
+from contactsafe.tasks.base.evaluation import check_autoreset, episode_metrics, step_values
 
 _STILL = Dither(amplitude=0.0)
 
@@ -57,10 +57,7 @@ class EncodedVecEnv(Independent, VecEnv):
         dither: Dither = _STILL,
         actions: int = ACTION_SIZE,
     ):
-        if env.metadata.get("autoreset_mode") != AutoresetMode.SAME_STEP:
-            raise InvalidInputError(
-                f"the environment resets by {env.metadata.get('autoreset_mode')}; make it with AutoresetMode.SAME_STEP"
-            )
+        check_autoreset(env)
         if action_repeat < 1:
             raise InvalidInputError(f"action_repeat = {action_repeat}; give 1 or more")
         self.env = env

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.rate import POLICY_RATE_HZ
 
 _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 
@@ -27,7 +28,7 @@ class Dither:
 
     amplitude: float = 0.3
     period_s: float = 2.0
-    rate_hz: float = 60.0
+    rate_hz: float = float(POLICY_RATE_HZ)
 
     def __post_init__(self) -> None:
         """Refuse a motion that is none."""

@@ -28,18 +28,11 @@ from contactsafe.sim.state import of_physics
 from contactsafe.sim.stepping import run_ticks
 from contactsafe.sim.truth import sample_dtype, step_metrics_dtype, trace_dtype
 
-POLICY_RATE_HZ = 60
-"""Rate of the policy; 1 kHz does not divide by it, so its steps last 17, 17 and 16 ticks in turn."""
-
 TICK_S = 0.001
 """Time step of plant and controller, s."""
 
 MAX_TICKS = 17
-
-
-def ticks_of_step(step: int) -> int:
-    """Return the number of 1 kHz ticks of the policy step with this number, 17, 17, 16 in turn."""
-    return 16 if step % 3 == 2 else 17
+"""Most ticks of one call: those of a policy step at 60 Hz."""
 
 
 @compiled(nogil=True)

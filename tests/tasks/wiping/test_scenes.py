@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.robot import robots
 from contactsafe.sim.config import NO_NOISE, PlantConfig, WorldConfig
@@ -60,6 +61,13 @@ def test_the_lure_lies_on_the_right_and_the_tool_starts_on_the_left():
         assert pose[1] > -0.01
         assert OBSTACLE_AT[0] - 1e-3 <= met[1] <= OBSTACLE_AT[1] + 1e-3
     assert episodes.worlds.configs[0].obstacles[0] == far_away(None, None)
+
+
+@pytest.mark.parametrize(("size", "ink"), [((0.5, 0.5), 0.3), ((0.08, 0.6), 0.05)])
+def test_a_board_too_small_for_the_lure_is_refused_where_it_was_cut_in_silence(size, ink):
+    task = Wiping(WipingConfig(board=BoardConfig(size=size, ink_size=ink)))
+    with pytest.raises(InvalidInputError, match=r"has no room for an object .* from its centre; give .* m or more"):
+        task.towards_obstacle("safe", [0], far_away)
 
 
 def test_scenes_of_another_arm_were_those_of_the_panda():

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ActionConfig
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.pushes import Pushes
 
 

@@ -13,8 +13,8 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.observation import Observation
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.figures import EpisodeMetric, Figure
 from contactsafe.tasks.base.registry import backend_of, task_by_name

@@ -7,8 +7,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.metrics import CONTACT_N
-from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.figures import FIGURES, EpisodeMetric, Episodes, Figure
 
 HELD_OUT_SEED = 1_000_003
@@ -55,6 +55,17 @@ def figures_of(env: Any) -> tuple[Figure, ...]:
     return tuple(getattr(getattr(env, "unwrapped", env), "figures", FIGURES))
 
 
+def check_autoreset(vec_env: VectorEnv) -> None:
+    """Refuse an environment that does not reset in the step that ends an episode.
+
+    Raises:
+        InvalidInputError: so it is.
+    """
+    mode = vec_env.metadata.get("autoreset_mode")
+    if mode != AutoresetMode.SAME_STEP:
+        raise InvalidInputError(f"the environment resets by {mode}; make it with AutoresetMode.SAME_STEP")
+
+
 def check_rate(policy: Actor, rate_hz: float = POLICY_RATE_HZ) -> None:
     """Refuse a policy that was trained to be asked more or less often than it will be.
 
@@ -97,9 +108,7 @@ def evaluate_policy(
         InvalidInputError: episodes is below 1, the environment resets otherwise, or the policy was trained for
             another rate.
     """
-    mode = vec_env.metadata.get("autoreset_mode")
-    if mode != AutoresetMode.SAME_STEP:
-        raise InvalidInputError(f"the environment resets by {mode}; make it with AutoresetMode.SAME_STEP")
+    check_autoreset(vec_env)
     if episodes < 1:
         raise InvalidInputError(f"episodes = {episodes}; give 1 or more")
     check_rate(policy, rate_hz)

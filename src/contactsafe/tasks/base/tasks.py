@@ -13,6 +13,7 @@ from contactsafe.core.state import Entry, load_state_dict, of_generators, of_obj
 from contactsafe.policy.action import act
 from contactsafe.policy.action_config import ACTION_SIZE, action_limits
 from contactsafe.policy.observation import Observation
+from contactsafe.policy.rate import POLICY_RATE_HZ, ticks_of_step
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose, require_arm
 from contactsafe.robot.ik import InverseKinematics
@@ -20,7 +21,7 @@ from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
 from contactsafe.sim.backend import Backend
 from contactsafe.sim.config import WorldConfig
-from contactsafe.sim.worlds import POLICY_RATE_HZ, Worlds, ticks_of_step
+from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.figures import FIGURES, EpisodeMetric, Figure
 from contactsafe.tasks.base.pushes import PushSchedule
@@ -218,7 +219,7 @@ class Tasks(Independent):
         self._actions[:] = actions
         if self._pushes is not None:
             self._pushes.step()
-        ticks = np.where(self.tasks["steps"] % 3 == 2, ticks_of_step(2), ticks_of_step(0))
+        ticks = ticks_of_step(self.tasks["steps"])
         self.before_step()
 
         def run(start: int, stop: int) -> None:

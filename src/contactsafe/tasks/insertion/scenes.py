@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from contactsafe.policy.action import DOWN
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import level_rectangle
@@ -15,7 +16,6 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
-from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.scenes import TaskScenes
 from contactsafe.tasks.base.scripted import hold_still

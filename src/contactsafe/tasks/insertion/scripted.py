@@ -7,7 +7,7 @@ import numpy as np
 
 from contactsafe.core.copying import Independent
 from contactsafe.policy.action_config import ACTION_SIZE
-from contactsafe.sim.worlds import POLICY_RATE_HZ
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.tasks.base.scripted import RANDOM, Scripted
 from contactsafe.tasks.insertion.config import InsertionConfig
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
-from contactsafe.sim.worlds import POLICY_RATE_HZ
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.tasks.base.record import end_step, force_excess, observe_arm
 
 REWARD_TERMS = ("approach", "depth", "done", "time", "force", "arm_touched")

@@ -8,8 +8,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
+from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.figures import Panel
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import level_rectangle
@@ -17,7 +19,6 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
-from contactsafe.sim.worlds import POLICY_RATE_HZ
 from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
 from contactsafe.tasks.base.scenes import TaskScenes
 from contactsafe.tasks.base.scripted import hold_still
@@ -107,7 +108,17 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
     def towards_obstacle(
         self, controller: str, seeds: Sequence[int], obstacle_at: Callable[[Arm, np.ndarray], Obstacle]
     ) -> WipingEpisodes:
-        """Return boards with a lure on the right, begun on the left, and an obstacle between."""
+        """Return boards with a lure on the right, begun on the left, and an obstacle between.
+
+        Raises:
+            InvalidInputError: the board is too small for it.
+        """
+        needed = tuple(2 * abs(at) + size for at, size in zip(LURE_AT, LURE_SIZE, strict=True))
+        if (np.array(self.config.board.size) < np.array(needed)).any():
+            raise InvalidInputError(
+                f"a board of {self.config.board.size} m has no room for an object {LURE_AT} m from its centre; "
+                f"give {needed} m or more"
+            )
         probe, rngs = WipingTasks(self.config, arm=self.arm), [held_out(seed) for seed in seeds]
         worlds = [self.with_obstacle(obstacle_at(probe.arm, meeting_posture(probe, rng))) for rng in rngs]
         tasks = self.make_tasks(self.under(controller), seeds, worlds)
