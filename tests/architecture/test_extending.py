@@ -106,6 +106,50 @@ def test_an_observation_and_a_task_are_a_class(warm_task):
     env.close()
 
 
+class CoolTasks(WarmTasks):
+    """The same with a scalar field."""
+
+    own_fields = (*InsertionTasks.own_fields, ("temperature", float))
+
+    @property
+    def observation_vectors(self):
+        return (*InsertionTasks.observation_vectors.fget(self), Observation("temperature", 20.0, 5.0, "°C"))
+
+    def finish_step(self, start, stop):
+        InsertionTasks.finish_step(self, start, stop)
+        self.tasks["temperature"][start:stop] = 21.0
+
+    def own_info(self):
+        return InsertionTasks.own_info(self)
+
+
+def test_a_scalar_that_is_observed_is_a_vector_of_one_number():
+    tasks = CoolTasks(WarmConfig(), n=3)
+    for i in range(3):
+        tasks.reset(i, np.random.default_rng(0))
+    tasks.step(np.zeros((3, 18)))
+    np.testing.assert_array_equal(tasks.observation()["temperature"], np.full((3, 1), 21.0, np.float32))
+    assert tasks.observation(1)["temperature"].shape == (1,)
+    tasks.worlds.close()
+
+
+@pytest.mark.parametrize(
+    ("vector", "told"),
+    [
+        (Observation("heat", 20.0, 5.0), "observation 'heat' is no field of the task; declare it in own_fields"),
+        (Observation("temperature", (20.0, 20.0), (5.0, 5.0)), "has 2 centres, and the field of that name 1 numbers"),
+    ],
+)
+def test_an_observation_that_is_no_such_field_is_refused_when_the_tasks_are_made(vector, told):
+    with pytest.raises(InvalidInputError, match=told):
+        type("OddTasks", (CoolTasks,), {"observation_vectors": (vector,)})(WarmConfig())
+
+
+def test_an_observation_whose_scale_is_no_number_is_refused():
+    with pytest.raises(InvalidInputError, match="observation 'heat' has scale = 'hot'; give a number, or one for each"):
+        Observation("heat", 20.0, "hot")
+
+
 class Still:
     """A script."""
 

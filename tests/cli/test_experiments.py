@@ -11,6 +11,7 @@ from tests.cli.mistakes import mistake
 
 from contactsafe.cli import experiments, main
 from contactsafe.cli.experiments import Options, _command, _config, scenes_of
+from contactsafe.cli.training import _task_words
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.registry import ENTRIES
@@ -171,6 +172,7 @@ def test_the_command_on_the_page_named_a_task_of_ones_own_as_nobody_can_call_it(
     try:
         assert import_task("pressing:press") == "press"
         assert " --task pressing:press" in _command("demo", ExperimentConfig(), "press", None)
+        assert _task_words("press") == " --task pressing:press"
     finally:
         sys.modules.pop("pressing", None)
         TASKS.pop("press", None)

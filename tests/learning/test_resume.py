@@ -282,6 +282,23 @@ def test_what_cannot_be_resumed(encoder, tmp_path):
     assert str(error.value) == f"{config.out} holds a run of another version; start anew with another --out"
 
 
+def test_fewer_steps_than_are_done_are_refused_where_nothing_happened_and_the_settings_lied(encoder, tmp_path):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", total_steps=128, resume=False)
+    train_policy(config, FakeWiping)
+    kept = (config.out / "config.json").read_bytes()
+    with pytest.raises(InvalidInputError, match=r"total_steps = 64, but the run in .*run has done 128 already"):
+        train_policy(dataclasses.replace(config, resume=True, total_steps=64), FakeWiping)
+    assert (config.out / "config.json").read_bytes() == kept
+    train_policy(dataclasses.replace(config, resume=True), FakeWiping)
+
+
+def test_a_run_that_is_refused_leaves_no_folder_behind(encoder, tmp_path):
+    config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "run", observes=("foo",))
+    with pytest.raises(InvalidInputError, match="observes"):
+        train_policy(config, FakeWiping)
+    assert not config.out.exists()
+
+
 def test_a_folder_that_cannot_be_written_is_told_before_anything_is_made(encoder, tmp_path):
     (tmp_path / "file").write_text("")
     config = dataclasses.replace(PPO, encoder=encoder, out=tmp_path / "file" / "run")

@@ -8,6 +8,7 @@ import pytest
 
 import contactsafe
 from contactsafe.core.errors import OutputError
+from contactsafe.core.files import LOCK
 from contactsafe.report import prepare_output, terminal_table, write_report, write_summary
 from contactsafe.report.output import write_whole
 from contactsafe.report.summary import trials_csv
@@ -147,3 +148,10 @@ def test_own_tables_follow_in_the_terminal():
         "  3     so         4.50",
         "  12    what          -",
     ]
+
+
+def test_a_report_does_not_go_into_the_folder_of_a_training_run(tmp_path):
+    (tmp_path / LOCK).write_text("")
+    with pytest.raises(OutputError, match="holds a training run; give another folder with --out"):
+        prepare_output(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]

@@ -15,11 +15,12 @@ from contactsafe.core.parse import one_of, some_of
 from contactsafe.core.progress import progress_bar
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.tasks import DEFAULT_TASK, TASKS
+from contactsafe.tasks.base.registry import TASK_FORM
 
 COMPILES = "the first run compiles for a minute or two"
 
-TaskName = Annotated[str, one_of(TASKS)]
-Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS, check=presets.by_name)]
+TaskName = Annotated[str, one_of(TASKS, also=TASK_FORM)]
+Controllers = Annotated[tuple[str, ...], some_of(presets.PRESETS, check=presets.by_name, also=presets.FORM)]
 BundleFolder = Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: the shipped one)")]
 
 

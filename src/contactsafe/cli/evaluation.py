@@ -16,7 +16,7 @@ from contactsafe.policy.policy import Policy
 from contactsafe.results.experiment import to_json
 from contactsafe.tasks import DEFAULT_TASK, ENGINES, make_vec, task_by_name
 from contactsafe.tasks.base.config import TaskConfig
-from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, figures_of
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, figures_of, side_by_side
 from contactsafe.tasks.base.figures import names
 from contactsafe.tasks.base.task import Task
 
@@ -64,8 +64,7 @@ def evaluate(arguments: Sequence[str]) -> None:
     bundle = None if asked.scripted else load_bundle(asked.bundle, described.name)
     config = described.config(asked, None if bundle is None else bundle.conditions)
     most = _MOST_SIDE_BY_SIDE.get(asked.engine, 16)
-    side_by_side = max(n for n in range(1, most + 1) if asked.episodes % n == 0)
-    env = make_vec(described.name, side_by_side, config, asked.engine)
+    env = make_vec(described.name, side_by_side(asked.episodes, most), config, asked.engine)
     if bundle is None:
         policy = described.scripted_policy(asked.scripted, config, env, asked.seed)
     else:

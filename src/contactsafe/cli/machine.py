@@ -7,7 +7,7 @@ from typing import Annotated
 
 from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress
 from contactsafe.cli.experiments import scenes_of
-from contactsafe.core.compiled import CACHE_FOLDER
+from contactsafe.core.compiled import CACHE_FOLDER, compile_in_silence
 from contactsafe.core.parse import some_of
 from contactsafe.core.progress import progress_bar
 from contactsafe.results.experiment import to_json
@@ -52,6 +52,7 @@ def warmup(joints: Joints = ("6", "7")) -> None:
     from contactsafe.cli.compiling import steps
 
     started = time.monotonic()
+    compile_in_silence()
     parts = steps(joints)
     with progress_bar(total=len(parts), desc="compiling") as bar:
         for name, run in parts.items():

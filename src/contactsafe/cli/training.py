@@ -11,6 +11,7 @@ from contactsafe.core.parse import parse
 from contactsafe.policy.bundle import FOLDER
 from contactsafe.results.experiment import to_json
 from contactsafe.tasks import DEFAULT_TASK, TASKS, task_by_name
+from contactsafe.tasks.base.registry import place_of
 
 KINDS = ("vae", "ppo", "sac")
 
@@ -25,8 +26,8 @@ _HELP = f"""usage: contactsafe train {{{",".join(KINDS)}}} [options]
 
 --task NAME says what is learned: {", ".join(TASKS)}. All show a progress bar
 and log to TensorBoard. A run that was stopped or killed goes on with --resume
-from its last epoch or rollout, with the settings of its last session where none
-are given, and ends with the weights that it would have had.
+from its last epoch or rollout and ends with the weights that it would have had;
+all settings but --max-minutes that are not given are those of its last session.
 `contactsafe train ppo --task NAME --help` lists the settings of PPO, and those
 that a task is learned with unless told otherwise."""
 
@@ -81,7 +82,12 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     config = _settings(kind, f"contactsafe train {algorithm}", arguments, usual)
     if first_run():
         print(f"contactsafe: {COMPILES}", file=sys.stderr)
-    results = train_policy(config)
+    try:
+        results = train_policy(config)
+    except KeyboardInterrupt:
+        command = f"contactsafe train {algorithm} --out {config.out} --resume{_task_words(config.task)}"
+        print(f"contactsafe: no bundle yet; {command} goes on, with --max-minutes 0.1 it exports", file=sys.stderr)
+        raise
     if results:
         print(to_json(results))
     print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}{_task_words(config.task)}")
@@ -89,4 +95,4 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
 
 def _task_words(task: str) -> str:
     """Return the option that names a task, where it must be named."""
-    return "" if task == DEFAULT_TASK else f" --task {task}"
+    return "" if task == DEFAULT_TASK else f" --task {place_of(task)}"

@@ -75,6 +75,9 @@ def safe() -> ControllerConfig:
 
 PRESETS: dict[str, Callable[[], ControllerConfig]] = {"vices": vices, "paper": paper, "safe": safe}
 
+FORM = "NAME:PARAMETER=VALUE"
+"""What `by_name` takes beside a name."""
+
 ABOUT = {
     "vices": "the baseline: variable impedance control (Martín-Martín et al. 2019) with a posture task, "
     "blind to contact of the arm",

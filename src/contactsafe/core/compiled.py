@@ -139,7 +139,8 @@ def inlined(function: Callable) -> Any:
 
 
 ANNOUNCEMENT = (
-    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it beforehand)"
+    "contactsafe: compiling for this machine, once, for up to a few minutes (`contactsafe warmup` does it beforehand "
+    "for all that is shipped)"
 )
 """What is said on stderr when the first function has to be compiled; what is in the cache is loaded in silence."""
 
@@ -151,12 +152,17 @@ class _Announcer(event.Listener):
 
     def on_start(self, event):
         ours = event.data["dispatcher"].py_func.__module__.startswith("contactsafe.")
-        if ours and not self.said and sys.stderr is not None:
-            self.said = True
+        if ours and not _Announcer.said and sys.stderr is not None:
+            _Announcer.said = True
             print(ANNOUNCEMENT, file=sys.stderr, flush=True)
 
     def on_end(self, event):
         """Nothing is to be said then."""
+
+
+def compile_in_silence() -> None:
+    """Say nothing when the first function has to be compiled: somebody asked for it."""
+    _Announcer.said = True
 
 
 event.register("numba:compile", _Announcer())

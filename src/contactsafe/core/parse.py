@@ -27,65 +27,66 @@ _PLAINER: dict[str, str | Callable[[re.Match], str]] = {
     r"invalid choice ('.*?') for argument '(.*?)'\. Expected one of \((.*?)\)": (
         lambda found: f"{found[2]}: {found[1]} is unknown; choose from {found[3].replace(chr(39), '')}"
     ),
-    r"(is unknown; choose from .*?)\.? Argument helptext: .*": r"\1",
-    r" Argument helptext: (--[\w.-]+)": r"; \1",
+    r"\.? Argument helptext: .*": "",
     r"Missing from [\w ]+: ": "missing: ",
     r" \(required\)": "",
     r"Unrecognized options: ": "unknown: ",
-    r" Perhaps you meant: ": "; perhaps you meant ",
+    r" Perhaps you meant: (--[\w-]+).*": r"; perhaps you meant \1",
 }
 """What tyro says, and how it is said here."""
 
 
-def one_of(names: Collection[str], check: Callable[[str], Any] | None = None) -> PrimitiveConstructorSpec:
+def one_of(
+    names: Collection[str], check: Callable[[str], Any] | None = None, also: str = ""
+) -> PrimitiveConstructorSpec:
     """Say in `Annotated` of a text that it is one of some names: help lists them, and no other passes.
 
     Args:
         names: all there are, from where they are defined.
         check: raises ValueError for a text that does not pass, where a name may have more behind it; None for names.
+        also: what else may be said, by its form.
     """
     known = names
     return PrimitiveConstructorSpec(
         nargs=1,
-        metavar=f"{{{','.join(known)}}}",
-        instance_from_str=lambda words: _checked(words[0], known, check),
+        metavar=_metavar(known, ",", also),
+        instance_from_str=lambda words: _checked(words[0], known, check, also),
         is_instance=lambda value: value is None or value in known or (check is not None and isinstance(value, str)),
         str_from_instance=lambda value: [str(value)],
     )
 
 
 def some_of(
-    names: Iterable[str], separator: str = ",", check: Callable[[str], Any] | None = None
+    names: Iterable[str], separator: str = ",", check: Callable[[str], Any] | None = None, also: str = ""
 ) -> PrimitiveConstructorSpec:
     """Say of a tuple that it holds some of some names; see `one_of`.
 
     Args:
         names: all there are, from where they are defined.
         separator: what stands between them on the command line, a comma or a space.
-        check: as of `one_of`.
+        check, also: as of `one_of`.
     """
     known = tuple(names)
     return PrimitiveConstructorSpec(
         nargs="*" if separator == " " else 1,
-        metavar=f"{{{','.join(known)}}}{separator.strip() or ' '}...",
+        metavar=f"{_metavar(known, ',', also)}{separator.strip() or ' '}...",
         instance_from_str=lambda words: tuple(
-            _checked(name.strip(), known, check) for name in separator.join(words).split(separator)
+            _checked(name.strip(), known, check, also) for name in separator.join(words).split(separator)
         ),
         is_instance=lambda value: isinstance(value, tuple) and (check is not None or set(value) <= set(known)),
         str_from_instance=lambda value: list(value) if separator == " " else [separator.join(value)],
     )
 
 
-def _checked(name: str, known: Collection[str], check: Callable[[str], Any] | None) -> str:
-    if check is None or name.isidentifier():
-        return _known(name, known)
-    check(name)
-    return name
+def _metavar(known: Collection[str], separator: str, also: str) -> str:
+    return f"{{{separator.join([*known, *filter(None, [also])])}}}"
 
 
-def _known(name: str, known: Collection[str]) -> str:
-    if name not in known:
-        raise ValueError(f"'{name}' is unknown; choose from {', '.join(known)}")
+def _checked(name: str, known: Collection[str], check: Callable[[str], Any] | None, also: str) -> str:
+    if check is not None and not name.isidentifier():
+        check(name)
+    elif name not in known:
+        raise ValueError(f"'{name}' is unknown; choose from {', '.join([*known, *filter(None, [also])])}")
     return name
 
 

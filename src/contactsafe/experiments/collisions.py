@@ -88,21 +88,22 @@ def run_battery(
             f"{len(controllers)} controllers, {len(seeds)} seeds, plants {', '.join(plants)}; "
             f"give one or more of each, plants from {', '.join(PLANTS)}"
         )
-    used = robots.panda() if arm is None else require_arm(arm)
+    usual = robots.panda()
+    arm = usual if arm is None else require_arm(arm)
     batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
     # Each batch steps in native threads; several at a time, so that one steps while another is being set up.
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
         done = list(
             pool.map(
-                lambda batch: _run_batch(used, batch, controllers, plants, progress, recorded=batch is batches[0]),
+                lambda batch: _run_batch(arm, batch, controllers, plants, progress, recorded=batch is batches[0]),
                 batches,
             )
         )
     finally:
         pool.shutdown(cancel_futures=True)
     trials = tuple(trial for of_batch, _ in done for trial in of_batch)
-    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers, plants, arm)))
+    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers, plants, _same_arm(arm, usual))))
     return Experiment(
         NAME, "Collisions", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,), tables=tables
     )
@@ -130,9 +131,13 @@ def _run_batch(
     return trials, recordings
 
 
-def _replay(controllers: Mapping[str, ControllerConfig], plants: Sequence[str], arm: Arm | None) -> str:
+def _same_arm(one: Arm, other: Arm) -> bool:
+    return (one.description, one.tool) == (other.description, other.tool)
+
+
+def _replay(controllers: Mapping[str, ControllerConfig], plants: Sequence[str], usual_arm: bool) -> str:
     """Return how one seed is run again, with {seed} in its place."""
-    if arm is not None:
+    if not usual_arm:
         return "run_battery(controllers, [{seed}], arm=arm)"
     if all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
         names = "" if tuple(controllers) == ExperimentConfig.controllers else f" --controllers {','.join(controllers)}"

@@ -11,6 +11,7 @@ import io
 import json
 import os
 import re
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ from typing import Any
 import torch
 
 from contactsafe.core.errors import InvalidInputError, OutputError, shown
-from contactsafe.core.files import held, write_whole
+from contactsafe.core.files import LOCK, held, write_whole
 from contactsafe.learning.checking import CheckpointError
 
 CHECKPOINT = "checkpoint.pt"
@@ -58,6 +59,7 @@ def run_folder(out: Path | str, resume: bool) -> Iterator[Path]:
         InvalidInputError: resume is true and there is no checkpoint.
     """
     out = Path(out)
+    made = not out.exists()
     if resume and not os.path.isfile(out / CHECKPOINT):
         raise InvalidInputError(f"no {CHECKPOINT} in {out} to resume from; leave --resume out to start anew")
     try:
@@ -69,7 +71,12 @@ def run_folder(out: Path | str, resume: bool) -> Iterator[Path]:
     with held(out):
         if not resume and (out / CHECKPOINT).exists():
             raise OutputError(f"{out} holds a training run already; give --resume to go on with it, or another --out")
-        yield out
+        try:
+            yield out
+        except InvalidInputError:
+            if made and os.listdir(out) == [LOCK]:  # refused before anything was done
+                shutil.rmtree(out)
+            raise
 
 
 def save_checkpoint(out: Path | str, state: dict[str, Any]) -> None:

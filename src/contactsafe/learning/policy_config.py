@@ -14,6 +14,7 @@ from contactsafe.policy.action_config import GAINS
 from contactsafe.policy.conditions import Conditions
 from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.tasks import DEFAULT_TASK, TASKS, task_by_name
+from contactsafe.tasks.base.registry import TASK_FORM
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -83,9 +84,9 @@ class PolicyConfig:
     encoder: Path | None = Path("runs/vae")
     out: Path = Path("runs/policy")
     resume: bool = False
-    task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
+    task: Annotated[str, one_of(TASKS, also=TASK_FORM)] = DEFAULT_TASK
     as_paper: bool = Conditions.as_paper
-    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name)] = Conditions.controller
+    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name, presets.FORM)] = Conditions.controller
     gains: Annotated[str, one_of(GAINS)] = Conditions.gains
     gentleness: float = 1.0
     randomise: bool = True

@@ -124,6 +124,7 @@ class Run(OfTraining):
         with refused_as(self.config.out):
             check_unchanged(entry(state, "task", dict), self.task)
             env = self._check(state)
+        self._check_steps(state["config"]["total_steps"], state["counters"]["num_timesteps"])
         model = self.model
         if self.replay:
             self.replay.load(state["replay_rows"])
@@ -140,6 +141,15 @@ class Run(OfTraining):
         load_random_state(state["random"])
         self.saved_steps = model.num_timesteps
         return float(state["minutes"])
+
+    def _check_steps(self, before: Any, done: int) -> None:
+        """Refuse to end a run before where it is, when that was not its end before."""
+        wanted = self.config.total_steps
+        if wanted != before and wanted < done:
+            raise InvalidInputError(
+                f"total_steps = {wanted}, but the run in {self.config.out} has done {done} already; give more, or "
+                "leave it out"
+            )
 
     def _check(self, state: dict[str, Any]) -> dict[str, Any]:
         """Refuse what `save` cannot have written for such a model and environment; return the environment's."""

@@ -28,7 +28,7 @@ from contactsafe.policy.observation import ObservationScaling, chosen
 from contactsafe.policy.perception import NO_IMAGE, PAPER
 from contactsafe.policy.policy import Policy
 from contactsafe.tasks import TASKS, make_vec, task_by_name
-from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy
+from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, side_by_side
 
 _NEVER = sys.maxsize
 """Stable-Baselines3 logs once so many iterations; `Recorder` logs in its place."""
@@ -196,15 +196,15 @@ def _portable(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _evaluate(folder: Path, make_env: MakeEnv, config: PolicyConfig) -> dict[str, Any]:
-    env = make_env(min(config.num_envs, config.evaluate_episodes))
+    env = make_env(side_by_side(config.evaluate_episodes))
     try:
         policy = Policy(folder, _homography(env))
         with progress_bar(total=config.evaluate_episodes, desc="held-out episodes", unit="episode") as bar:
-            seed = config.seed + HELD_OUT_SEED
+            seed = HELD_OUT_SEED + config.seed
             results = evaluate_policy(
                 policy, env, config.evaluate_episodes, seed, config.rate_hz, lambda _: bar.update()
             )
     finally:
         env.close()
     del results["records"]
-    return {**results, "seed": seed}
+    return {**results, "seed": config.seed}

@@ -22,6 +22,7 @@ from contactsafe.learning.run_settings import check_same_config, plain
 from contactsafe.policy.bundle import ENCODER, ENCODER_DESCRIPTION
 from contactsafe.policy.perception import ENCODER_FORMAT, Perception
 from contactsafe.tasks import DEFAULT_TASK, TASKS
+from contactsafe.tasks.base.registry import TASK_FORM
 from contactsafe.vision.rectify import WINDOW_M
 
 _MAY_DIFFER = ("out", "resume", "threads", "held_out", "probe_steps")
@@ -56,7 +57,7 @@ class VaeConfig:
         threads: torch's. More than one crawls as soon as anything else wants a core.
     """
 
-    task: Annotated[str, one_of(TASKS)] = DEFAULT_TASK
+    task: Annotated[str, one_of(TASKS, also=TASK_FORM)] = DEFAULT_TASK
     out: Path = Path("runs/vae")
     resume: bool = False
     representation: Literal["log_polar", "tool", "paper"] = "log_polar"

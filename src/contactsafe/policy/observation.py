@@ -1,12 +1,13 @@
 """What a policy's network observes: the vectors that a task declares and a latent, each at its scale, as one vector."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.policy.action_config import ActionConfig
 
 MIN_STD = 0.2
@@ -19,30 +20,45 @@ class Observation:
 
     Attributes:
         name: key in the environment's observation.
-        centre: what counts as zero, one number for each of the vector's.
+        centre: what counts as zero, one number for each of the vector's; a number for a scalar.
         scale: what counts as one, likewise.
         unit: of the numbers.
         doc: what they are.
     """
 
     name: str
-    centre: tuple[float, ...]
-    scale: tuple[float, ...]
+    centre: tuple[float, ...] | float
+    scale: tuple[float, ...] | float
     unit: str = ""
     doc: str = ""
 
     def __post_init__(self) -> None:
         """Refuse a centre and a scale of different lengths, and a scale that is not positive."""
-        if not self.centre or len(self.centre) != len(self.scale) or not all(scale > 0.0 for scale in self.scale):
+        centre, scale = (_numbers(self, name) for name in ("centre", "scale"))
+        if not centre or len(centre) != len(scale) or not all(one > 0.0 for one in scale):
             raise InvalidInputError(
-                f"observation '{self.name}' has {len(self.centre)} centres and scales {self.scale}; give as many "
+                f"observation '{self.name}' has {len(centre)} centres and scales {scale}; give as many "
                 "positive scales as centres, one or more"
             )
 
     @property
     def size(self) -> int:
         """Numbers in the vector."""
-        return len(self.centre)
+        return np.size(self.centre)
+
+
+def _numbers(observation: Observation, name: str) -> tuple[float, ...]:
+    """Return a field as numbers, and keep it so."""
+    value = getattr(observation, name)
+    try:
+        numbers = tuple(float(one) for one in np.atleast_1d(value))
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"observation '{observation.name}' has {name} = {shown(value)}; give a number, or one for each of the "
+            "vector's"
+        ) from None
+    object.__setattr__(observation, name, numbers)
+    return numbers
 
 
 def target_observation(config: ActionConfig) -> Observation:
@@ -76,6 +92,26 @@ def chosen(vectors: Sequence[Observation], names: Iterable[str]) -> tuple[Observ
     return tuple(known[name] for name in names)
 
 
+def check_fields(vectors: Sequence[Observation], record: np.dtype) -> None:
+    """Refuse observations that are no field of the tasks' records, or one of another size.
+
+    Raises:
+        InvalidInputError: one is.
+    """
+    for vector in vectors:
+        if vector.name not in (record.names or ()):
+            raise InvalidInputError(
+                f"observation '{vector.name}' is no field of the task; declare it in own_fields, or observe one of "
+                f"{', '.join(record.names or ())}"
+            )
+        size = math.prod(record[vector.name].shape)
+        if size != vector.size:
+            raise InvalidInputError(
+                f"observation '{vector.name}' has {vector.size} centres, and the field of that name {size} numbers; "
+                "give one for each"
+            )
+
+
 @dataclass(frozen=True)
 class ObservationScaling:
     """Fixed scaling of [vectors, latent]; no running statistics that would have to be shipped beside a policy.
@@ -101,9 +137,9 @@ class ObservationScaling:
         clip: float = 8.0,
     ) -> "ObservationScaling":
         """Join the vectors' stated scaling with the latent's measured one."""
-        centre = [*(c for vector in vectors for c in vector.centre), *latent_mean]
+        centre = [*(c for vector in vectors for c in np.atleast_1d(vector.centre)), *latent_mean]
         std = np.maximum(np.asarray(latent_std, dtype=np.float64), MIN_STD)
-        scale = [*(s for vector in vectors for s in vector.scale), *std]
+        scale = [*(s for vector in vectors for s in np.atleast_1d(vector.scale)), *std]
         names = tuple(vector.name for vector in vectors)
         return cls(names, tuple(float(c) for c in centre), tuple(float(s) for s in scale), clip)
 

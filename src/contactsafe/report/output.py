@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 from contactsafe.core.errors import OutputError
-from contactsafe.core.files import replace
+from contactsafe.core.files import LOCK, replace
 
 _REMEDY = "give a folder you may write to with --out"
 
@@ -20,9 +20,11 @@ def prepare_output(folder: str | Path) -> Path:
         The folder, absolute.
 
     Raises:
-        OutputError: it cannot be made or written.
+        OutputError: it cannot be made or written, or holds a training run.
     """
     folder = Path(folder).expanduser()
+    if (folder / LOCK).exists():
+        raise OutputError(f"{folder} holds a training run; give another folder with --out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=".contactsafe-", dir=folder)

@@ -15,7 +15,7 @@ def panda(tool: Tool = WIPER) -> Arm:
     """Give the Franka Emika Panda.
 
     Args:
-        tool: what the flange carries.
+        tool: what the flange carries; `WIPER`, a hand with a block of felt, `HAND` alone, or a `Tool` of one's own.
     """
     return arm_from_description(PANDA, tool)
 
@@ -24,6 +24,6 @@ def fr3(tool: Tool = WIPER) -> Arm:
     """Give the Franka Research 3.
 
     Args:
-        tool: what the flange carries.
+        tool: what the flange carries; `WIPER`, a hand with a block of felt, `HAND` alone, or a `Tool` of one's own.
     """
     return arm_from_description(FR3, tool)

@@ -79,7 +79,10 @@ def test_observation_is_a_copy(env):
 @pytest.mark.parametrize(
     ("action", "text"),
     [
-        (np.full(18, np.nan), "actions hold a number that is not finite; every action must be in [-1, 1]"),
+        (
+            np.full(18, np.nan),
+            "actions hold a number that is not finite; give finite ones, of which those outside [-1, 1] are clipped",
+        ),
         (np.zeros(17), "actions has shape (1, 17); give 1 × 18 numbers"),
         ("left", "actions is ndarray, not numbers; give 1 × 18 numbers"),
     ],

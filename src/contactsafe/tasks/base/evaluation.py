@@ -55,6 +55,14 @@ def figures_of(env: Any) -> tuple[Figure, ...]:
     return tuple(getattr(getattr(env, "unwrapped", env), "figures", FIGURES))
 
 
+def side_by_side(episodes: int, most: int = 16) -> int:
+    """Return how many environments an evaluation steps at a time: as many as divide the episodes, up to `most`.
+
+    The episodes are then the same wherever so many are asked for.
+    """
+    return max(n for n in range(1, most + 1) if episodes % n == 0)
+
+
 def check_autoreset(vec_env: VectorEnv) -> None:
     """Refuse an environment that does not reset in the step that ends an episode.
 

@@ -50,6 +50,10 @@ def register_task(name: str, place: str) -> None:
         )
 
 
+TASK_FORM = "MODULE:NAME"
+"""What the command line takes beside the name of a task."""
+
+
 def import_task(place: str) -> str:
     """Import the module that registers a task, also from the current folder; return the task's name.
 
@@ -65,7 +69,8 @@ def import_task(place: str) -> str:
         importlib.import_module(module)
     except Exception as error:
         raise InvalidInputError(
-            f"task '{place}': module {module} cannot be imported: {shown(error)}; give module:name"
+            f"task '{place}': module {module} cannot be imported: {shown(error)}; run the command in "
+            f"the folder of {module}.py, or name that folder in PYTHONPATH"
         ) from None
     finally:
         sys.path.remove(os.getcwd())

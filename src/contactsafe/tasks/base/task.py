@@ -39,7 +39,7 @@ class TaskOptions:
         pushed: push the arm now and then, 5 to 25 N on links 3 to 6.
     """
 
-    controller: Annotated[str | None, one_of(presets.PRESETS, presets.by_name), _AS_TRAINED] = None
+    controller: Annotated[str | None, one_of(presets.PRESETS, presets.by_name, presets.FORM), _AS_TRAINED] = None
     pushed: bool = False
 
     def settings(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from contactsafe.core.errors import InvalidInputError, UnreachableError
 from contactsafe.core.state import Entry, load_state_dict, of_generators, of_object, of_records, state_dict
 from contactsafe.policy.action import act
 from contactsafe.policy.action_config import ACTION_SIZE, action_limits
-from contactsafe.policy.observation import Observation
+from contactsafe.policy.observation import Observation, check_fields
 from contactsafe.policy.rate import POLICY_RATE_HZ, ticks_of_step
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose, require_arm
@@ -103,6 +103,7 @@ class Tasks(Independent):
         self._actions = np.zeros((n, ACTION_SIZE))
         self._rule = posture_rule(self.arm)
         self._observed = tuple(vector.name for vector in self.observation_vectors)
+        check_fields(self.observation_vectors, self.tasks.dtype)
         self.prepare()
         _warm_up(self)
 
@@ -215,7 +216,9 @@ class Tasks(Independent):
         """
         actions = array_of(actions, self._actions.shape, "actions")
         if not np.isfinite(actions).all():
-            raise InvalidInputError("actions hold a number that is not finite; every action must be in [-1, 1]")
+            raise InvalidInputError(
+                "actions hold a number that is not finite; give finite ones, of which those outside [-1, 1] are clipped"
+            )
         self._actions[:] = actions
         if self._pushes is not None:
             self._pushes.step()
@@ -234,7 +237,8 @@ class Tasks(Independent):
 
     def observation(self, i: Any = slice(None)) -> dict[str, np.ndarray]:
         """Return what the policies observe, copied: vectors float32 (n, k), and the task's own."""
-        vectors = {name: self.tasks[name][i].astype(np.float32) for name in self._observed}
+        shape = self.tasks["steps"][i].shape
+        vectors = {name: self.tasks[name][i].astype(np.float32).reshape(*shape, -1) for name in self._observed}
         return {**vectors, **self.own_observation(i)}
 
     @property

@@ -1,0 +1,34 @@
+"""What the page of the environments lists is what they give."""
+
+import re
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+import contactsafe  # noqa: F401  registers the environments
+
+PAGE = (Path(__file__).parents[2] / "docs" / "concepts" / "environments.md").read_text(encoding="utf-8")
+
+
+def table(task, name):
+    """Return the rows of a task's table by their first cell, without its marks."""
+    section = PAGE.partition(f"\n## {task}\n")[2].partition("\n## ")[0]
+    lines = section.partition(f"| {name} |")[2].partition("\n\n")[0].splitlines()[2:]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return {cells[0].strip("`"): cells[1:] for cells in rows}
+
+
+@pytest.mark.parametrize("task", ["Wiping", "Insertion"])
+def test_the_page_lists_what_the_environment_gives(task):
+    env = gymnasium.make(f"contactsafe/{task}-v0")
+    env.reset(seed=0)
+    *_, info = env.step(env.action_space.sample())
+    spaces, vectors = env.observation_space, {vector.name: vector for vector in env.unwrapped.observation_vectors}
+    rows = table(task, "observation")
+    assert {name: tuple(map(int, re.findall(r"\d+", cells[0]))) for name, cells in rows.items()} == {
+        name: space.shape for name, space in spaces.items()
+    }
+    assert {name: rows[name][1] for name in vectors} == {name: vector.unit for name, vector in vectors.items()}
+    assert set(table(task, "info")) == set(info)
+    env.close()
