@@ -73,7 +73,10 @@ def test_training_and_evaluation_take_it_by_module_and_name(folder):
 @pytest.mark.parametrize(
     ("task", "told"),
     [
-        ("nowhere:press", r"task 'nowhere:press': module nowhere cannot be imported: .*; run the command in the folder of nowhere.py"),
+        (
+            "nowhere:press",
+            r"task 'nowhere:press': module nowhere cannot be imported: .*; run the command in the folder of nowhere.py.*",
+        ),
         ("press:push", r"task 'press:push': press registers no task 'push'; it needs register_task"),
     ],
 )
