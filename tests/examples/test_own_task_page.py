@@ -75,7 +75,7 @@ def test_training_and_evaluation_take_it_by_module_and_name(folder):
     [
         (
             "nowhere:press",
-            r"task 'nowhere:press': module nowhere cannot be imported: .*; run the command in the folder of nowhere.py.*",
+            r"task 'nowhere:press': module nowhere cannot be imported: .*; run the command in the folder of .*",
         ),
         ("press:push", r"task 'press:push': press registers no task 'push'; it needs register_task"),
     ],
