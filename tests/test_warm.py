@@ -90,3 +90,12 @@ def test_what_compiles_says_so_once_beforehand_and_only_then(jit_cache, said, tm
     done = subprocess.run([sys.executable, "-c", TWICE], capture_output=True, text=True, check=True, env=environment)
     assert done.stderr.splitlines() == [ANNOUNCEMENT] * said
     assert done.stdout == ""
+
+
+def test_warming_up_recommended_itself(tmp_path):
+    asked_for = "from contactsafe.core.compiled import compile_in_silence\ncompile_in_silence()\n"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    words = [sys.executable, "-c", asked_for + TWICE]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
+    assert done.stderr == ""
+    assert list(tmp_path.rglob("*.nbi"))  # it did compile

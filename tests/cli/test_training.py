@@ -1,6 +1,7 @@
 """`contactsafe train`."""
 
 import importlib.util
+import json
 import re
 
 import pytest
@@ -66,15 +67,33 @@ def test_a_task_whose_module_is_elsewhere_is_told_where_to_run(capsys, tmp_path,
     assert told.endswith("run the command in the folder of poker.py, or name that folder in PYTHONPATH")
 
 
-def test_a_training_that_is_stopped_says_how_to_go_on(capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize("begun", [True, False])
+@pytest.mark.parametrize("kind", ["vae", "ppo"])
+def test_a_training_that_is_stopped_says_how_to_go_on_where_it_can(kind, begun, capsys, tmp_path, monkeypatch):
     pytest.importorskip("torch")
+    out = tmp_path / "my run"
 
-    def stopped(config):
+    def stopped(config, *_):
+        if begun:
+            out.mkdir()
+            (out / "checkpoint.pt").write_bytes(b"")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("contactsafe.learning.train_policy.train_policy", stopped)
-    out = tmp_path / "run"
+    module = "train_vae" if kind == "vae" else "train_policy"
+    monkeypatch.setattr(f"contactsafe.learning.{module}.{module}", stopped)
     with pytest.raises(KeyboardInterrupt):
-        main(["train", "ppo", "--task", "insertion", "--out", str(out)])
-    command = f"contactsafe train ppo --out {out} --resume --task insertion"
-    assert f"no bundle yet; {command} goes on, with --max-minutes 0.1 it exports" in capsys.readouterr().err
+        main(["train", kind, "--out", str(out)])
+    said = f"contactsafe: contactsafe train {kind} --out '{out}' --resume goes on from here\n"
+    assert (said in capsys.readouterr().err) == begun
+
+
+def test_the_last_evaluation_of_a_training_met_other_episodes_than_the_command(capsys, tmp_path):
+    pytest.importorskip("torch")
+    words = "--task insertion --total-steps 64 --num-envs 8 --rollout-steps 8 --batch 64 --evaluate-episodes 6 --seed 3"
+    assert main(["train", "ppo", *words.split(), "--out", str(tmp_path / "run")]) == 0
+    bundle = tmp_path / "run" / "bundle"
+    capsys.readouterr()
+    assert main(["evaluate", str(bundle), *["--task", "insertion", "--episodes", "6", "--seed", "3", "--json"]]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    results = json.loads((bundle / "bundle.json").read_text(encoding="utf-8"))["results"]
+    assert results == {name: printed[name] for name in results}

@@ -7,6 +7,7 @@ import gymnasium
 import pytest
 
 import contactsafe  # noqa: F401  registers the environments
+from contactsafe.tasks.wiping.camera import INK_PIXEL, OTHER_PIXEL
 
 PAGE = (Path(__file__).parents[2] / "docs" / "concepts" / "environments.md").read_text(encoding="utf-8")
 
@@ -29,6 +30,11 @@ def test_the_page_lists_what_the_environment_gives(task):
     assert {name: tuple(map(int, re.findall(r"\d+", cells[0]))) for name, cells in rows.items()} == {
         name: space.shape for name, space in spaces.items()
     }
-    assert {name: rows[name][1] for name in vectors} == {name: vector.unit for name, vector in vectors.items()}
+    assert {name: rows[name][1:] for name in vectors} == {n: [vector.unit, vector.doc] for n, vector in vectors.items()}
     assert set(table(task, "info")) == set(info)
     env.close()
+
+
+def test_the_page_says_which_pixels_are_ink_which_it_had_the_wrong_way_round():
+    said = re.search(r"(\d+) where ink .* is seen, else (\d+)", table("Wiping", "observation")["mask"][-1])
+    assert (int(said[1]), int(said[2])) == (INK_PIXEL, OTHER_PIXEL)

@@ -1,8 +1,10 @@
 """`contactsafe train`: the vision encoder and the policies."""
 
+import contextlib
 import importlib.util
+import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from contactsafe.cli.common import COMPILES, first_run, task_of
@@ -67,7 +69,8 @@ def _train_encoder(arguments: list[str]) -> None:
     if make_sampler is None:
         raise InvalidInputError(f"task '{config.task}' has no camera; it needs no vision encoder")
     sampler = make_sampler()
-    report = train_vae(config, sampler.sample, sampler.homography)
+    with _saying_how_to_go_on("vae", config):
+        report = train_vae(config, sampler.sample, sampler.homography)
     shown = ("representation", "active_latents", "reconstruction", "nearest_foreground")
     print(to_json({name: report[name] for name in shown if name in report}))
     print(f"encoder: {config.out}; next: contactsafe train ppo --encoder {config.out}")
@@ -82,15 +85,25 @@ def _train_policy(algorithm: str, arguments: list[str]) -> None:
     config = _settings(kind, f"contactsafe train {algorithm}", arguments, usual)
     if first_run():
         print(f"contactsafe: {COMPILES}", file=sys.stderr)
-    try:
+    with _saying_how_to_go_on(algorithm, config):
         results = train_policy(config)
-    except KeyboardInterrupt:
-        command = f"contactsafe train {algorithm} --out {config.out} --resume{_task_words(config.task)}"
-        print(f"contactsafe: no bundle yet; {command} goes on, with --max-minutes 0.1 it exports", file=sys.stderr)
-        raise
     if results:
         print(to_json(results))
     print(f"policy: {config.out / FOLDER}; next: contactsafe evaluate {config.out / FOLDER}{_task_words(config.task)}")
+
+
+@contextlib.contextmanager
+def _saying_how_to_go_on(kind: str, config: Any) -> Iterator[None]:
+    """Say of a training that is stopped which command goes on, where there is something to go on from."""
+    from contactsafe.learning.checkpoints import CHECKPOINT
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if (config.out / CHECKPOINT).exists():
+            command = f"contactsafe train {kind} --out {shlex.quote(str(config.out))} --resume"
+            print(f"contactsafe: {command}{_task_words(config.task)} goes on from here", file=sys.stderr)
+        raise
 
 
 def _task_words(task: str) -> str:

@@ -1,5 +1,6 @@
 """Train a policy on what a task lets it observe, with any algorithm of Stable-Baselines3; export and evaluate it."""
 
+import json
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
@@ -27,6 +28,7 @@ from contactsafe.policy.dither import Dither
 from contactsafe.policy.observation import ObservationScaling, chosen
 from contactsafe.policy.perception import NO_IMAGE, PAPER
 from contactsafe.policy.policy import Policy
+from contactsafe.results.experiment import to_json
 from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, side_by_side
 
@@ -207,4 +209,4 @@ def _evaluate(folder: Path, make_env: MakeEnv, config: PolicyConfig) -> dict[str
     finally:
         env.close()
     del results["records"]
-    return {**results, "seed": config.seed}
+    return {**json.loads(to_json(results)), "seed": config.seed}  # as `evaluate` prints them: JSON knows no NaN

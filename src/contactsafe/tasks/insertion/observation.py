@@ -15,7 +15,7 @@ WRENCH = Observation(
     centre=(0.0, 0.0, 5.0, 0.0, 0.0, 0.0),
     scale=(3.0, 3.0, 5.0, 0.05, 0.05, 0.05),  # 5 N at the edge of the peg
     unit="N, N m",
-    doc="on the peg, about its tip, as the wrist measures it, less what it read in the air, smoothed, world axes",
+    doc="on the peg, about its tip, as the wrist measures it, less its bias, smoothed, world axes",
 )
 
 ELAPSED = Observation("elapsed", centre=(5.0,), scale=(5.0,), unit="s", doc="time since the episode began")
