@@ -82,7 +82,7 @@ def draw(curves: dict[Path, Curve], out: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     if len(settings) > 1:
         lines = [by_minutes.plot([], [], color=f"C{k}")[0] for k in range(len(settings))]
-        figure.legend(lines, settings, loc="outside lower center", ncols=len(settings), frameon=False)
+        figure.legend(lines, settings, loc="outside lower center", ncols=min(len(settings), 4), frameon=False)
     figure.savefig(out, dpi=100)
 
 
