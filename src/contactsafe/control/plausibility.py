@@ -34,7 +34,7 @@ _STUCK_RAD = 2e-5
 def is_usable(m: Record, arm: Record, braking: int) -> bool:
     """Tell whether every number of a measurement is one that this arm can have.
 
-    A broken force sensor stops the arm, but it is braked by its joints, which are still seen.
+    A broken sensor of force or torque stops the arm, but it is braked by its joints, which are still seen.
 
     Args:
         m: `measurement_dtype` record.
@@ -46,7 +46,9 @@ def is_usable(m: Record, arm: Record, braking: int) -> bool:
             return False
     if m.has_time != 0 and not math.isfinite(m.time):
         return False
-    return m.has_wrench == 0 or braking != 0 or all_usable(m.wrench_ee)
+    if braking != 0:
+        return True
+    return (m.has_wrench == 0 or all_usable(m.wrench_ee)) and (m.has_torque == 0 or all_usable(m.torque))
 
 
 @compiled

@@ -24,7 +24,7 @@ def vices() -> ControllerConfig:
     return paper().with_(contact_aware=False)
 
 
-SAFE: dict[str, tuple[float | bool, str]] = {
+SAFE: dict[str, tuple[float | bool | str, str]] = {
     "compensation_gain": (50.0, "the printed 1.5 1/s answers a contact after most of its impulse has passed"),
     "detection_gain": (250.0, "lag of 4 ms, that of the low-pass behind it"),
     "residual_cutoff_hz": (40.0, "noise of joint velocities stays below δ, and the lag at 4 ms"),

@@ -36,8 +36,13 @@ def as_numbers(arm: Any) -> dict[str, np.ndarray | float]:
     n = int(arm.model.nv)
     fields = {name: array_of(getattr(arm, name), (n, *row), name) for name, row in _PER_JOINT.items()}
     single = {name: float(array_of(getattr(arm, name), (), name)) for name in ("torque_rate_max", "lever_doubted")}
-    points = len(arm.surface) if hasattr(arm.surface, "__len__") else 0
-    return {**fields, **single, "surface": array_of(arm.surface, (points, SURFACE_COLUMNS), "surface")}
+    surfaces = {name: _rows(getattr(arm, name), name) for name in ("surface", "places")}
+    return {**fields, **single, **surfaces}
+
+
+def _rows(value: ArrayLike, name: str) -> np.ndarray:
+    points = len(value) if hasattr(value, "__len__") else 0
+    return array_of(value, (points, SURFACE_COLUMNS), name)
 
 
 def array_of(value: ArrayLike, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
@@ -81,7 +86,7 @@ def refuse_unsound(arm: Any) -> None:
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
-    if not np.isfinite(arm.surface).all():
+    if not (np.isfinite(arm.surface).all() and np.isfinite(arm.places).all()):
         raise InvalidInputError(f"surface of arm '{arm.name}' has a number that is not finite; give finite points")
     if not 0.0 <= arm.lever_doubted < np.inf:
         raise InvalidInputError(f"lever_doubted = {arm.lever_doubted:g} m; give a finite number from 0 on")

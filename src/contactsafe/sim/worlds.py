@@ -117,7 +117,8 @@ class Worlds(Independent):
         for record, model, config in zip(self.records, self.models, self.configs, strict=True):
             fill_plant(record["plant"], model, config)
             fill_errors(record["errors"], arm, config, TICK_S)
-        self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
+        channels = max(noise_channels(arm.n, config.sensors) for config in self.configs)
+        self._noise = np.zeros((n, MAX_TICKS, channels))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
         self._threads = Threads(min(n, os.cpu_count() or 1))
         self.backends = [backend(arm, config, TICK_S) for config in self.configs] if backend else []
@@ -172,6 +173,10 @@ class Worlds(Independent):
         errors["q_seen"], errors["qd_seen"], errors["tau_delayed"] = q, 0.0, gravity
         errors["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         errors["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
+        if sensors.joint_torque:
+            errors["joints"]["torque_bias"] = sensors.joint_torque_bias_nm * self.rngs[i].standard_normal(self.arm.n)
+        errors["bristle"], errors["joints"]["band"], errors["joints"]["qd_before"] = 0.0, 0.0, 0.0
+        errors["joints"]["torque_held"], record["motor"], record["drag"] = gravity, gravity, 0.0
         if self.backends:
             self.backends[i].reset(q)
             self.backends[i].read(record)
