@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from contactsafe import robots
-from contactsafe.control import localisation
-from contactsafe.control.localisation import Spread, localisation_dtype
+from contactsafe.control import evidence, localisation
+from contactsafe.control.evidence import Spread
+from contactsafe.control.localisation import localisation_dtype
 from contactsafe.core.compiled import compiled
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
@@ -20,18 +21,18 @@ NORMAL_N, ACROSS_N = 30.0, 10.0
 def _localise(places, handles, torque, sigma, q, prior, times):
     localisation.forget_place(places[0], q)
     for _ in range(times):
-        variance = localisation.moment_variance(torque)
+        variance = evidence.moment_variance(torque)
         localisation.localise(places[0], handles[0], torque, Spread(sigma, variance), q, prior, 1.0)
 
 
 @compiled
 def _evidence(handles, index, torque, sigma, variance, point, force):
-    return localisation.force_into(handles[0], index, torque, Spread(sigma, variance), point, force)
+    return evidence.force_into(handles[0], index, torque, Spread(sigma, variance), point, force)
 
 
 @compiled
 def _point(handles, index, n, point, normal):
-    return localisation.point_into(handles[0], index, n, point, normal)
+    return evidence.point_into(handles[0], index, n, point, normal)
 
 
 class Bench:
@@ -161,7 +162,7 @@ def test_a_second_posture_makes_the_set_smaller_and_a_third_reading_of_the_same_
     def read(q):
         here = Bench(panda, q)
         torque = here.torque(index, -25.0 * here.point(index)[2]) + 0.1 * rng.standard_normal(7)
-        variance = localisation.moment_variance(torque)
+        variance = evidence.moment_variance(torque)
         _go_on(places, here.handles, torque, np.full(7, 0.2), variance, q)
         log = places["log"][0, : len(panda.places)]
         probability = np.exp(log - log.max())
@@ -198,5 +199,5 @@ def test_a_sweep_compares_all_points_by_the_same_torque(panda):
 
 @compiled
 def _part(places, handles, torque, sigma, q):
-    variance = localisation.moment_variance(torque)
+    variance = evidence.moment_variance(torque)
     localisation.localise(places[0], handles[0], torque, Spread(sigma, variance), q, 0.02, 0.001)

@@ -75,4 +75,4 @@ def test_a_residual_is_what_the_robots_own_estimate_says_with_the_other_sign(fel
     log, one = felt(name, np.zeros(6))
     ours = np.array([contact.torque for contact in one.contacts])[200:]
     theirs = -(log["tau_ext"] - log["tau_ext"][100:200].mean(axis=0))[200:]
-    assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.9
+    assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.8

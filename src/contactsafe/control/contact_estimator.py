@@ -77,20 +77,19 @@ class ContactEstimator(Instance):
         sent = shaped(measurement.torque if command is None else command, self.arm.n, "command")
         self.set_measurement(measurement)
         estimate_at(self._ticked, self._index)
-        state = self.record["state"]
-        if state["clock"]["braking"]:  # nothing was believed for so long that all begins anew
-            self.reset(state["arm"]["q"])
+        if self.record["state"]["clock"]["braking"]:  # nothing was believed for so long that all begins anew
+            self.reset(self.record["state"]["arm"]["q"])
             self.set_measurement(measurement)
             estimate_at(self._ticked, self._index)
-        commanded = state["command"]
-        if np.isfinite(sent).all():
-            commanded["tau"], commanded["friction"] = sent, self._friction(measurement)
+        self._drive(sent, measurement.torque is not None)
         return contact_of(self._reported)
 
-    def _friction(self, measurement: Measurement) -> np.ndarray:
-        if measurement.torque is not None or not self.config.impedance.friction_compensation:
-            return np.zeros(self.arm.n)
-        return joint_friction(self.arm.friction, self.record["state"]["arm"]["qd"])
+    def _drive(self, sent: np.ndarray, measured: bool) -> None:
+        """Remember what drives the joints until the next measurement, and how much of it is friction."""
+        if np.isfinite(sent).all():
+            state, expects = self.record["state"], self.config.impedance.friction_compensation and not measured
+            state["command"]["tau"] = sent
+            state["command"]["friction"] = joint_friction(self.arm.friction, state["arm"]["qd"]) if expects else 0.0
 
 
 def sensitive() -> ControllerConfig:

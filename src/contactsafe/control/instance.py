@@ -1,5 +1,7 @@
 """One `controller_dtype` record with its arm: what all that steps such a record has in common."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from contactsafe.control.checks import checked_slot, seconds, shaped
@@ -27,7 +29,7 @@ class Instance(Independent):
         record: everything it is made of; copy its `state` to save it.
     """
 
-    _bound = ("record", "_ticked", "_measured", "_reported")
+    _bound: ClassVar[tuple[str, ...]] = ("record", "_ticked", "_measured", "_reported")
 
     def __init__(self, arm: Arm, config: ControllerConfig, records: np.ndarray | None, index: int) -> None:
         self.arm = arm

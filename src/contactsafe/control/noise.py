@@ -55,9 +55,6 @@ def start_noise(noise: Record, allowed_nm: float) -> None:
 def follow_noise(noise: Record, tau_external: Vector, step: Record, untouched: bool, allowed_nm: float) -> None:
     """Measure the noise of the residual at full bandwidth, and set the bandwidth that keeps it to what is allowed.
 
-    Its median is followed, upwards or downwards by a fraction of itself: a push that begins moves it no faster than
-    that, however hard it is.
-
     Args:
         noise: `noise_dtype` record; advanced.
         tau_external: raw external torque, (n,), N m.
@@ -70,16 +67,23 @@ def follow_noise(noise: Record, tau_external: Vector, step: Record, untouched: b
     observer_step(noise.unfiltered, step.full_filter_gain, tau_external)
     observer_step(noise.residual, step.full_lowpass_gain, noise.unfiltered)
     observer_step(noise.slow, filter_gain(_SLOW_1_S, step.dt), noise.residual)
-    largest, factor = 0.0, 1.0
     if untouched:
-        noise.seconds += step.dt
-        factor = math.exp(step.dt / (_LEARN_S if noise.seconds < 1.0 else _KEEP_S))
-    for i in range(tau_external.shape[0]):
+        _learn(noise, step.dt, _FLOOR * allowed_nm)
+    noise.bandwidth = min(max(allowed_nm / noise.sigma.max(), _LEAST_BANDWIDTH), 1.0)
+
+
+@inlined
+def _learn(noise: Record, dt: float, least_nm: float) -> None:
+    """Follow the median of the noise, upwards or downwards by a fraction of itself.
+
+    A push that begins moves it no faster than that, however hard it is.
+    """
+    noise.seconds += dt
+    factor = math.exp(dt / (_LEARN_S if noise.seconds < 1.0 else _KEEP_S))
+    for i in range(noise.sigma.shape[0]):
         seen = abs(noise.residual[i] - noise.slow[i])
         noise.sigma[i] *= factor if seen > _MEDIAN * noise.sigma[i] else 1.0 / factor
-        noise.sigma[i] = max(noise.sigma[i], _FLOOR * allowed_nm)
-        largest = max(largest, noise.sigma[i])
-    noise.bandwidth = min(max(allowed_nm / largest, _LEAST_BANDWIDTH), 1.0)
+        noise.sigma[i] = max(noise.sigma[i], least_nm)
 
 
 @inlined

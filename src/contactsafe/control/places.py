@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.control.localisation import Spread, force_into, point_into
+from contactsafe.control.evidence import Spread, force_into, point_into
 from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
@@ -48,15 +48,15 @@ def places_of(records: np.ndarray, index: int, share: float) -> list[Place]:
     if not state["touch"]["touching"] or state["localisation"]["best"] < 0:
         return []
     n = len(state["arm"]["q"])
-    weights, place, force = np.zeros(points), np.zeros((points, 3)), np.zeros((points, 3))
-    links = np.zeros(points, dtype=np.int64)
-    _list(records, index, weights, links, place, force)
+    weights, links = np.zeros(points), np.zeros(points, dtype=np.int64)
+    point, force = np.zeros((points, 3)), np.zeros((points, 3))
+    _list(records, index, weights, links, point, force)
     probability = np.exp(weights - weights.max())
     probability /= probability.sum()
     order = np.argsort(-probability, kind="stable")
     count = int(np.searchsorted(np.cumsum(probability[order]), share * (1.0 - 1e-12))) + 1
     return [
-        Place(min(int(links[k]), n), bool(links[k] > n), place[k], force[k], float(probability[k]))
+        Place(min(int(links[k]), n), bool(links[k] > n), point[k], force[k], float(probability[k]))
         for k in order[:count]
     ]
 

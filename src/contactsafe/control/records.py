@@ -129,8 +129,9 @@ def output_dtype(n: int) -> np.dtype:
             ("kind", _i),  # key of KINDS
             ("link", _i),  # 1 … n, 0 for none
             ("probability", _f),  # of the kind
-            ("point", _f, (3,)),  # where, world, m; NaN where unknown
-            ("force", _f, (3,)),  # of the environment there, world, N
+            *(
+                (name, _f, (3,)) for name in ("point", "force")
+            ),  # where, m, NaN where unknown, and what is there, N; world
             ("contact_command_nm", _f),  # commanded torque against the contact before it is bounded, N m
             ("contact_limit_nm", _f),  # the bound in force; inf where there is none
             ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command

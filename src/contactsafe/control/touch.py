@@ -7,7 +7,8 @@ import numpy as np
 from contactsafe.control.baseline import follow_baseline
 from contactsafe.control.codes import FREE, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
 from contactsafe.control.detection import GRAVITY_SIGMAS
-from contactsafe.control.localisation import Spread, forget_place, localise, moment_variance
+from contactsafe.control.evidence import Spread, moment_variance
+from contactsafe.control.localisation import forget_place, localise
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import inlined
 from contactsafe.core.linalg import dot

@@ -16,7 +16,7 @@ _i = np.int64
 VELOCITY_SOURCES = ("robot", "positions", "quieter")
 """What `velocity_source` may be."""
 
-_ROBOT, _POSITIONS = 0, 1
+_ROBOT, _POSITIONS, _QUIETER_OF_TWO = 0, 1, 2
 
 _BAND_1_S = 300.0
 """Noise is compared below 50 Hz: what is faster the observer filters anyway."""
@@ -62,10 +62,8 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
     """Take a measurement over and choose the velocity in force of each joint.
 
     Args:
-        velocity: `velocity_dtype` record; advanced.
-        arm: of the state, as measured.
-        since: ticks that passed since the last measurement.
-        dt: tick, s.
+        velocity, arm: records; the former is advanced.
+        since, dt: ticks that passed since the last measurement, and how long one is, s.
         untouched: whether nothing touches the arm; else nothing is learned of the noise.
         choice: place in `VELOCITY_SOURCES`.
     """
@@ -74,23 +72,28 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
         return
     in_time = _IN_TIME[0] < since < _IN_TIME[1]
     velocity.ticks = velocity.ticks + 1.0 if in_time else 0.0
-    band = filter_gain(_BAND_1_S, dt)
-    learning = in_time and untouched and velocity.ticks > 3.0
-    gain = 1.0 / min(max(velocity.ticks - 3.0, 1.0), _MEMORY_TICKS)
+    learning, band = in_time and untouched and velocity.ticks > 3.0, filter_gain(_BAND_1_S, dt)
     for i in range(arm.q.shape[0]):
         by_positions = (arm.q[i] - velocity.q_before[i]) / (since * dt)
         apart = 0.5 * (arm.qd[i] + velocity.qd_before[i]) - by_positions
-        velocity.apart[i] += band * (apart - velocity.apart[i])
-        third = _third_difference(velocity.difference[i], by_positions * dt)
-        if learning:
-            velocity.apart_variance[i] += gain * (velocity.apart[i] * velocity.apart[i] - velocity.apart_variance[i])
-            velocity.third_variance[i] += gain * (third * third - velocity.third_variance[i])
-        if choice != 2:
+        _compare(velocity, i, by_positions * dt, apart, band, learning)
+        if choice != _QUIETER_OF_TWO:
             velocity.source[i] = choice
         elif velocity.ticks > _LEAST_TICKS:
             velocity.source[i] = _quieter(velocity, i, band, dt)
         velocity.qd[i] = by_positions if velocity.source[i] == _POSITIONS else arm.qd[i]
-        velocity.q_before[i], velocity.qd_before[i] = arm.q[i], arm.qd[i]
+    velocity.q_before[:], velocity.qd_before[:] = arm.q, arm.qd
+
+
+@inlined
+def _compare(velocity: Record, i: int, moved: float, apart: float, band: float, learning: bool) -> None:
+    """Follow joint i's third difference of positions, and what its two velocities differ by."""
+    velocity.apart[i] += band * (apart - velocity.apart[i])
+    third = _third_difference(velocity.difference[i], moved)
+    if learning:
+        gain = 1.0 / min(max(velocity.ticks - 3.0, 1.0), _MEMORY_TICKS)
+        velocity.apart_variance[i] += gain * (velocity.apart[i] * velocity.apart[i] - velocity.apart_variance[i])
+        velocity.third_variance[i] += gain * (third * third - velocity.third_variance[i])
 
 
 @inlined

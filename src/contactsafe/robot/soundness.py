@@ -40,7 +40,7 @@ def as_numbers(arm: Any) -> dict[str, np.ndarray | float]:
     return {**fields, **single, **surfaces}
 
 
-def _rows(value: ArrayLike, name: str) -> np.ndarray:
+def _rows(value: Any, name: str) -> np.ndarray:
     points = len(value) if hasattr(value, "__len__") else 0
     return array_of(value, (points, SURFACE_COLUMNS), name)
 
