@@ -77,8 +77,7 @@ def localise(
     Args:
         place: `localisation_dtype` record; advanced.
         handle: of the nominal model, up to date.
-        torque: external, (n,), N m.
-        known: how well the torque is known.
+        torque, known: external, (n,), N m, and how well it is known.
         q, dt: posture, (n,), rad, and the time that passed, s.
         tool_prior: probability of the tool before anything is known.
     """
