@@ -93,7 +93,7 @@ def _change_into(c: Record, changed: Vector, sigma: Vector) -> bool:
 def _kind(touch: Record, place: Record, state: Record, pressed: float) -> tuple[int, float]:
     """Return what touches, a key of KINDS, and how probable that is. A contact of the arm comes before the tool's."""
     force = state.tool_wrench.force
-    if touch.touching == 0 and state.mode == FREE:
+    if touch.touching == 0:
         on_tool = state.arm.has_wrench != 0 and dot(force, force) >= pressed * pressed
         return (TOOL if on_tool else NO_CONTACT), 1.0
     if state.mode == FREE and place.tool_probability > 0.5:
