@@ -100,7 +100,7 @@ def test_an_unknown_command_is_refused(capsys):
     out, err = capsys.readouterr()
     assert out == ""
     assert err == (
-        "contactsafe: command 'dance' is unknown; choose from demo, train, evaluate, experiment, bench, warmup\n"
+        "contactsafe: command 'dance' is unknown; choose from demo, train, evaluate, experiment, replay, bench, warmup\n"
     )
 
 
