@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ from numpy.testing import assert_allclose
 from tests.control.plant import Plant, controller_at, hold
 
 from contactsafe import ContactEstimator, Measurement, presets, robots
-from contactsafe.control.contact_estimator import sensitive
 from contactsafe.core.errors import InvalidInputError
 
 UNTOUCHED = np.zeros(6)
@@ -74,7 +74,7 @@ def test_a_push_is_felt_with_its_link_its_force_and_its_place(arm, estimator, li
     assert_allclose(contact.force @ force / 30.0, 30.0, rtol=0.35)
 
 
-def test_places_are_likeliest_first_and_sum_up_to_the_share(arm, estimator):
+def test_places_are_likeliest_first_and_sum_up_to_the_fraction(arm, estimator):
     torque, _ = push_on(arm, 5, (0.0, 30.0, 0.0))
     feel(estimator, still(arm), 500)
     feel(estimator, still(arm, torque))
@@ -91,10 +91,10 @@ def test_places_are_likeliest_first_and_sum_up_to_the_share(arm, estimator):
         assert np.isfinite(place.force).all()
 
 
-@pytest.mark.parametrize("share", [0.0, 1.5, -1.0, "all"])
-def test_no_share_of_a_probability_is_refused(estimator, share):
+@pytest.mark.parametrize("fraction", [0.0, 1.5, -1.0, "all"])
+def test_no_fraction_of_a_probability_is_refused(estimator, fraction):
     with pytest.raises(InvalidInputError, match="more than 0 and at most 1"):
-        estimator.places(share)
+        estimator.places(fraction)
 
 
 def test_without_a_wrench_a_press_of_the_tool_is_the_tools(arm, estimator):
@@ -181,13 +181,113 @@ def test_after_a_gap_it_begins_anew_by_itself(arm, estimator):
     assert contact.touched
 
 
-def test_broken_numbers_raise_nothing_and_are_no_contact(arm, estimator):
+def test_broken_numbers_raise_nothing_and_are_said(arm, estimator):
     feel(estimator, still(arm), 50)
     broken = still(arm)._replace(q=np.full(7, np.nan))
-    for _ in range(5):
-        contact = estimator.step(broken)
+    assert [estimator.step(broken).bridged for _ in range(5)] == [1, 2, 3, 4, 5]
+    assert estimator.fault.startswith("a measurement is not finite")
+    contact = feel(estimator, still(arm), 50)
     assert not contact.touched
-    assert not feel(estimator, still(arm), 50).touched
+    assert contact.bridged == 0
+
+
+def test_a_broken_force_sensor_does_not_blind_it(arm, estimator):
+    """A column of NaN for 300 rows: nothing was felt, and nothing said so."""
+    torque, _ = push_on(arm, 5, (0.0, 25.0, 0.0))
+    feel(estimator, still(arm, wrench=np.full(6, np.nan)), 300)
+    assert feel(estimator, still(arm, torque, np.full(6, np.nan)), 100).touched
+
+
+def test_a_broken_torque_sensor_leaves_the_command(arm, estimator):
+    torque, _ = push_on(arm, 4, (0.0, 25.0, 0.0))
+    sent = arm.dynamics(arm.home, np.zeros(7))["g"]
+    broken = Measurement(arm.home, np.zeros(7), UNTOUCHED, torque=np.full(7, np.nan))
+    for _ in range(100):
+        estimator.step(broken, sent)
+    for _ in range(100):
+        contact = estimator.step(broken, sent - torque)
+    assert_allclose(contact.torque, torque, atol=0.05)
+
+
+@pytest.mark.parametrize("value", [9e5, 1e200, -1e5])
+def test_a_torque_that_no_joint_has_is_not_believed(arm, estimator, value):
+    feel(estimator, still(arm), 100)
+    absurd = still(arm)._replace(torque=np.where(np.arange(7) == 2, value, still(arm).torque))
+    contact = estimator.step(absurd)
+    assert contact.bridged == 1
+    assert not feel(estimator, still(arm), 20).touched
+    estimator.step(Measurement(arm.home, np.zeros(7), UNTOUCHED), absurd.torque)
+    assert np.isfinite(feel(estimator, still(arm), 20).torque).all()
+
+
+def swung(arm, k, rate_hz, hz=1.0, size=0.3):
+    """Measure an arm that swings all its joints in air at a tick."""
+    t, w = k / rate_hz, 2.0 * np.pi * hz
+    phase = np.arange(7.0)
+    q = arm.home + size * (np.sin(w * t + phase) - np.sin(phase))
+    qd, qdd = size * w * np.cos(w * t + phase), -size * w * w * np.sin(w * t + phase)
+    known = arm.dynamics(q, qd)
+    M = known["M"] - np.diag(arm.model.dof_armature)
+    return Measurement(q, qd, UNTOUCHED, t, M @ qdd + known["c"] + known["g"])
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "lost"),
+    [(91.0, 4), (91.0, 1), (1000.0, 10), (1000.0, 1)],
+    ids=["91 Hz, 4", "91 Hz, 1", "1 kHz, 10", "1"],
+)
+@pytest.mark.parametrize("source", ["positions", "quieter", "robot"])
+def test_measurements_lost_while_the_arm_accelerates_are_no_contact(arm, rate_hz, lost, source):
+    """A difference of positions is the velocity in the middle between them: after a gap that is long ago."""
+    estimator = ContactEstimator(arm, presets.sensitive().with_(velocity_source=source), 1.0 / rate_hz)
+    first = swung(arm, 0, rate_hz)
+    estimator.reset(first.q, first.qd)
+    for k in range(round(2.0 * rate_hz)):
+        if k % 30 >= lost or k < 30:
+            contact = estimator.step(swung(arm, k, rate_hz))
+            assert not contact.touched
+            assert not contact.in_contact
+
+
+@pytest.mark.parametrize("rate_hz", [91.0, 1000.0])
+def test_a_log_that_begins_amid_a_motion_begins_without_a_contact(arm, rate_hz):
+    estimator = ContactEstimator(arm, dt=1.0 / rate_hz)
+    start = round(0.2 * rate_hz)
+    first = swung(arm, start, rate_hz)
+    estimator.reset(first.q, first.qd)
+    for k in range(start, start + round(rate_hz)):
+        contact = estimator.step(swung(arm, k, rate_hz))
+        assert not contact.touched
+    assert np.abs(contact.torque).max() < 1.0
+
+
+def test_time_that_was_bridged_counts_once(arm, estimator):
+    feel(estimator, still(arm), 100)
+    before = float(estimator.record["state"]["baseline"]["seconds"])
+    for _ in range(15):
+        estimator.step(still(arm)._replace(q=np.full(7, np.nan)))
+    feel(estimator, still(arm), 1)
+    passed = float(estimator.record["state"]["baseline"]["seconds"]) - before
+    assert passed == pytest.approx(0.016, abs=0.002)
+
+
+def test_an_arm_whose_surface_nobody_knows_has_a_link_and_no_place(arm):
+    bare = replace(arm, surface=np.zeros((0, 7)), places=np.zeros((0, 7)), tool=None)
+    estimator = ContactEstimator(bare)
+    estimator.reset(bare.home)
+    feel(estimator, still(bare), 300)
+    contact = feel(estimator, still(bare, np.array([4.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 100)
+    assert contact.touched
+    assert contact.link == 2
+    assert np.isnan(contact.point).all()
+
+
+def test_the_controller_invents_no_place(arm):
+    plant, controller = Plant(arm), controller_at(arm, presets.safe())
+    plant.push("link5", (0.0, 30.0, 0.0))
+    out = plant.run(controller, hold(arm), 200, UNTOUCHED)
+    assert out.contact.in_contact
+    assert np.isnan([out.contact.probability, *out.contact.point, *out.contact.force]).all()
 
 
 def test_a_copy_goes_on_by_itself(arm, estimator):
@@ -203,5 +303,7 @@ def test_a_copy_goes_on_by_itself(arm, estimator):
 
 
 def test_what_it_is_told_by_default_is_what_real_signals_need():
+    sensitive = presets.sensitive
     assert sensitive().observer.velocity_source == "quieter"
+    sensitive = presets.sensitive
     assert sensitive().with_(velocity_source="robot", residual_noise_nm=np.inf) == presets.safe()

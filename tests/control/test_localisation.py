@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from contactsafe import robots
 from contactsafe.control import evidence, localisation
-from contactsafe.control.evidence import Spread
+from contactsafe.control.evidence import Uncertainty
 from contactsafe.control.localisation import localisation_dtype
 from contactsafe.core.compiled import compiled
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
@@ -22,12 +22,12 @@ def _localise(places, handles, torque, sigma, q, prior, times):
     localisation.forget_place(places[0], q)
     for _ in range(times):
         variance = evidence.moment_variance(torque)
-        localisation.localise(places[0], handles[0], torque, Spread(sigma, variance), q, prior, 1.0)
+        localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, prior, 1.0)
 
 
 @compiled
 def _evidence(handles, index, torque, sigma, variance, point, force):
-    return evidence.force_into(handles[0], index, torque, Spread(sigma, variance), point, force)
+    return evidence.force_into(handles[0], index, torque, Uncertainty(sigma, variance), point, force)
 
 
 @compiled
@@ -183,7 +183,26 @@ def _forget(places, q):
 
 @compiled
 def _go_on(places, handles, torque, sigma, variance, q):
-    localisation.localise(places[0], handles[0], torque, Spread(sigma, variance), q, 0.02, 1.0)
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.02, 1.0)
+
+
+def test_what_a_posture_said_is_added_once_when_the_arm_has_left_it(panda):
+    """Evidence of N postures, the one of now among them, over the root of N."""
+    places, sigma = np.zeros(1, localisation_dtype(7)), np.full(7, 0.2)
+    postures = [panda.home + k * np.array([0.3, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0]) for k in range(3)]
+    torques = [np.array([2.0, 5.0, 1.0, -3.0, 0.2, 0.1, 0.0]), np.array([1.0, 4.0, 1.5, -3.0, 0.1, 0.0, 0.0])]
+    torques.append(np.array([3.0, 4.0, 1.0, -2.0, 0.0, 0.3, 0.0]))
+    _forget(places, postures[0])
+    said = []
+    for q, torque in zip(postures, torques, strict=True):
+        here = Bench(panda, q)
+        variance = evidence.moment_variance(torque)
+        for _ in range(3):  # read thrice, it says the same
+            _go_on(places, here.handles, torque, sigma, variance, q)
+        said.append(np.array([here.evidence(k, torque, sigma, variance)[0] for k in range(0, 480, 20)]))
+    together = sum(one - one[0] for one in said) / np.sqrt(3.0)
+    log = places["log"][0, 0:480:20]
+    assert_allclose(log - log[0], together, rtol=1e-6, atol=1e-6)
 
 
 def test_a_sweep_compares_all_points_by_the_same_torque(panda):
@@ -200,4 +219,4 @@ def test_a_sweep_compares_all_points_by_the_same_torque(panda):
 @compiled
 def _part(places, handles, torque, sigma, q):
     variance = evidence.moment_variance(torque)
-    localisation.localise(places[0], handles[0], torque, Spread(sigma, variance), q, 0.02, 0.001)
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.02, 0.001)

@@ -81,3 +81,18 @@ def test_a_broken_torque_sensor_is_bridged_and_then_stops_the_arm(panda, value):
 def test_a_torque_of_another_shape_is_refused(panda):
     with pytest.raises(InvalidInputError, match=r"^torque has shape \(6,\)"):
         controller_at(panda, FAST).step(Measurement(panda.home, np.zeros(7), torque=np.zeros(6)), hold(panda))
+
+
+@pytest.mark.parametrize("source", ["robot", "positions"])
+def test_a_payload_that_is_told_amid_a_motion_is_no_contact(panda, source):
+    """The momentum that is taken over has no rotors in it where the torque is measured behind them."""
+    config = presets.safe().with_(velocity_source=source)
+    plant, controller = Geared(panda), controller_at(panda, config)
+    target = reach(panda, [0.15, 0.15, 0.0])
+    for k in range(400):
+        out = controller.step(Measurement(plant.q, plant.qd, np.zeros(6), torque=plant.behind_gears), target)
+        plant.step(out.torque)
+        if k == 200:
+            assert np.abs(plant.qd).max() > 0.5
+            controller.set_payload(0.02)
+        assert not out.contact.in_contact

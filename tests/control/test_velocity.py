@@ -26,6 +26,7 @@ def followed(q, qd, choice=QUIETER, untouched=True, since=1.0, dt=DT):
     velocities, arms = np.zeros(1, velocity_dtype(3)), np.zeros(1, ARM)
     arms["q"], arms["qd"] = q[0], qd[0]
     _start(velocities, arms)
+    _follow(velocities, arms, 1.0, dt, untouched, choice)  # the measurement it starts with
     taken = []
     for one_q, one_qd in zip(q[1:], qd[1:], strict=True):
         arms["q"], arms["qd"] = one_q, one_qd
@@ -77,6 +78,7 @@ def test_a_gap_between_two_measurements_is_not_noise():
     velocities, arms = np.zeros(1, velocity_dtype(3)), np.zeros(1, ARM)
     arms["q"], arms["qd"] = q[0], qd[0]
     _start(velocities, arms)
+    _follow(velocities, arms, 1.0, DT, True, QUIETER)
     for k in range(1, 1400):
         if 700 <= k < 720:  # lost
             continue

@@ -11,8 +11,8 @@ from contactsafe import Contact, ContactEstimator, Measurement, robots
 TOUCHES = {"a5": 7, "b9": 6, "c5": 5, "d3": 4}
 """Recording → link that is touched."""
 
-_GLOVE_EARLY_S, _GLOVE_S = 0.02, 0.3
-"""Before a touch by the glove, and after its end, a contact may be its."""
+_GLOVE_EARLY_S, _GLOVE_S = 0.05, 0.3
+"""Before a touch by the glove a contact may be its, and after its end the arm swings back."""
 
 
 def folder():
@@ -64,11 +64,15 @@ def arm_of(recording):
 
 
 def first_above(shown, log):
-    """Tell of each touch how long after its begin something showed, s; NaN where nothing did."""
+    """Tell of each touch how long after its begin something began to show, s; NaN where nothing did.
+
+    What showed before the touch began, and went on, is not it.
+    """
     t = log["t"]
+    starts = t[np.flatnonzero(shown[1:] & ~shown[:-1]) + 1]
     when = []
     for on, off in zip(log["on_s"], log["off_s"], strict=True):
-        during = t[shown & (t >= on - _GLOVE_EARLY_S) & (t <= off + _GLOVE_S)]
+        during = starts[(starts >= on - _GLOVE_EARLY_S) & (starts <= off)]
         when.append(during[0] - on if len(during) else np.nan)
     return np.array(when)
 

@@ -1,10 +1,13 @@
 """Where something may touch an arm: points on its surface, evenly spread, and on its tool."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from contactsafe import robots
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.description import Capsule
 from contactsafe.robot.touchable import capsule_places, touchable
 
@@ -87,8 +90,6 @@ def test_an_arm_without_surface_has_the_end_effector_point_alone():
 
 
 def test_a_sphere_is_a_capsule_too(panda):
-    from dataclasses import replace
-
     links = list(panda.description.links)
     links[6] = replace(links[6], capsules=(Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.05),))
     places = capsule_places(replace(panda.description, links=tuple(links)))
@@ -101,6 +102,21 @@ def test_a_users_arm_has_its_geoms_and_its_tool(panda):
     links = arm.places[arm.places[:, 0] > 0]
     np.testing.assert_array_equal(links, arm.surface)
     assert np.count_nonzero(arm.places[:, 0] == 0) >= 1
+
+
+@pytest.mark.parametrize(
+    ("places", "text"),
+    [
+        ([[9, 0, 0, 0, 0, 0, 1], [0] * 6 + [1]], "a link that is none of 0 to 7"),
+        ([[1.5, 0, 0, 0, 0, 0, 1], [0] * 6 + [1]], "a link that is none of 0 to 7"),
+        ([[0] * 6 + [1], [3, 0, 0, 0, 0, 0, 1]], r"the tool's \(link 0\) last"),
+        ([[3, 0, 0, 0, 0, 0, 1]], r"the tool's \(link 0\) last"),
+        ([[3, 0, 0, 0, 0, 0, 1]] * 704 + [[0] * 6 + [1]], "are 705; give at most 704"),
+    ],
+)
+def test_places_that_no_arm_has_are_refused(panda, places, text):
+    with pytest.raises(InvalidInputError, match=text):
+        replace(panda, places=np.array(places, float))
 
 
 SCENE = """<mujoco><option timestep="0.001"/><worldbody>

@@ -15,7 +15,7 @@ from contactsafe.core.compiled import compiled, inlined
 _f = np.float64
 
 _MEMORY_1_S = 0.5
-"""Learned within 2 s; a push that comes up more slowly shows as itself."""
+"""It is learned within 2 s. Of a push that comes up more slowly a part is taken for baseline, until it is found."""
 
 _LEARNED_S = 0.25
 
@@ -53,11 +53,12 @@ def follow_baseline(baseline: Record, residual: Vector, q: Vector, untouched: bo
             baseline.residual[i] += gain * (residual[i] - baseline.residual[i])
             baseline.q[i] += gain * (q[i] - baseline.q[i])
     known = min(baseline.seconds / _LEARNED_S, 1.0)
-    baseline.weight = known * max(1.0 - _distance(q, baseline.q) / _ELSEWHERE_RAD, 0.0)
+    baseline.weight = known * max(1.0 - distance(q, baseline.q) / _ELSEWHERE_RAD, 0.0)
 
 
 @compiled
-def _distance(a: Vector, b: Vector) -> float:
+def distance(a: Vector, b: Vector) -> float:
+    """Return how far two postures are from each other, rad."""
     squared = 0.0
     for i in range(a.shape[0]):
         squared += (a[i] - b[i]) ** 2

@@ -4,11 +4,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactsafe.control.checks import believable, shaped
+from contactsafe.control.codes import FAULTS
 from contactsafe.control.config import ControllerConfig, damping_rate
 from contactsafe.control.damping import GAIN_MARGIN
 from contactsafe.control.estimation import estimate_at
 from contactsafe.control.instance import Instance, checked_config
-from contactsafe.control.presets import safe
+from contactsafe.control.places import Place, places_of
+from contactsafe.control.presets import sensitive
 from contactsafe.control.signals import Contact, Measurement, contact_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, require_arm
@@ -16,6 +18,9 @@ from contactsafe.robot.friction import joint_friction
 
 RATES_HZ = (90.0, 2000.0)
 """Lowest and highest rate of measurements that the estimator is made for."""
+
+_BELIEVED = 10.0
+"""Multiple of a joint's torque limit beyond which no torque is one."""
 
 
 class ContactEstimator(Instance):
@@ -41,13 +46,14 @@ class ContactEstimator(Instance):
         )
         self.reset(np.clip(arm.home, arm.q_min, arm.q_max))
         self.step(Measurement(arm.home, np.zeros(arm.n), torque=np.zeros(arm.n)))  # compiles, or loads what was
+        self.places()
         self._is_reset = False
 
     def reset(self, q: ArrayLike, qd: ArrayLike | None = None) -> None:
         """Forget everything; the arm is at q (n,) rad and moves with qd (n,) rad/s, by default not at all.
 
         Raises:
-            InvalidInputError: a wrong shape, a number that is not finite, or more than the arm's joints can have.
+            InvalidInputError: a wrong shape, a number that is not finite, or velocities that the arm cannot have.
         """
         q = self.arm.joint_vector(q, "q")
         qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
@@ -56,7 +62,8 @@ class ContactEstimator(Instance):
         self.record["dynamics"] = dynamics = self.arm.dynamics(q, qd)
         state = self.record["state"]
         state["command"]["tau"], state["clock"]["q_good"] = dynamics["g"], q
-        self._is_reset = True
+        self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
+        self._fault, self._is_reset = 0, True
 
     def step(self, measurement: Measurement, command: ArrayLike | None = None) -> Contact:
         """Take one measurement over and return what touches the arm.
@@ -75,30 +82,60 @@ class ContactEstimator(Instance):
                 "neither measurement.torque nor a command was given; one of them must say what drives the joints"
             )
         sent = shaped(measurement.torque if command is None else command, self.arm.n, "command")
+        measurement = _whole(measurement, command)
         self.set_measurement(measurement)
         estimate_at(self._ticked, self._index)
-        if self.record["state"]["clock"]["braking"]:  # nothing was believed for so long that all begins anew
-            self.reset(self.record["state"]["arm"]["q"])
-            self.set_measurement(measurement)
-            estimate_at(self._ticked, self._index)
+        if self.record["state"]["clock"]["braking"]:
+            self._begin_anew(measurement)
         self._drive(sent, measurement.torque is not None)
-        return contact_of(self._reported)
+        return contact_of(self._reported, placed=True)
+
+    def places(self, fraction: float = 0.95) -> list[Place]:
+        """Return where the present contact may be: the places that together have a fraction of the probability.
+
+        Joint torques alone cannot tell some places apart; the set shrinks as the arm moves on in contact.
+
+        Args:
+            fraction: of the probability, 0 … 1.
+
+        Returns:
+            Likeliest first; empty where nothing shows in the joints.
+
+        Raises:
+            InvalidInputError: that is no fraction.
+        """
+        return places_of(self._ticked, self._index, fraction)
+
+    @property
+    def fault(self) -> str:
+        """'none', or the first reason since `reset` why a measurement was not believed."""
+        return FAULTS[int(self.record["state"]["fault"] or self._fault)]
+
+    def _begin_anew(self, measurement: Measurement) -> None:
+        """Start where the arm is now: nothing was believed for so long that what was known is out of date."""
+        fault = int(self._fault or self.record["state"]["fault"])
+        self.reset(self.record["state"]["arm"]["q"])
+        self._fault = fault
+        self.set_measurement(measurement)
+        estimate_at(self._ticked, self._index)
 
     def _drive(self, sent: np.ndarray, measured: bool) -> None:
         """Remember what drives the joints until the next measurement, and how much of it is friction."""
-        if np.isfinite(sent).all():
+        believed = np.abs(sent) < _BELIEVED * self.arm.tau_max  # NaN is not
+        if self.record["state"]["clock"]["bridged"] == 0 and believed.all():
             state, expects = self.record["state"], self.config.impedance.friction_compensation and not measured
             state["command"]["tau"] = sent
             state["command"]["friction"] = joint_friction(self.arm.friction, state["arm"]["qd"]) if expects else 0.0
 
 
-def sensitive() -> ControllerConfig:
-    """Return `presets.safe()` with what real signals need: the quieter of two velocities, noise that is filtered.
-
-    A real Panda's own velocity signal has 4 to 6 mrad/s of noise between 5 and 50 Hz, which shows as contact; its
-    positions are quiet. A tenth of δ is as much noise as does not delay detection.
-    """
-    return safe().with_(velocity_source="quieter", residual_noise_nm=0.15)
+def _whole(measurement: Measurement, command: ArrayLike | None) -> Measurement:
+    """Return a measurement without a sensor that is broken; positions and velocities are the tick's to refuse."""
+    wrench, torque = measurement.wrench_ee, measurement.torque
+    if wrench is not None and not np.isfinite(wrench).all():
+        measurement = measurement._replace(wrench_ee=None)
+    if torque is not None and command is not None and not np.isfinite(torque).all():
+        measurement = measurement._replace(torque=None)
+    return measurement
 
 
 def _at_rate(config: ControllerConfig, dt: float) -> ControllerConfig:

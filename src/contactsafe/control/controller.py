@@ -64,6 +64,7 @@ class Controller(Instance):
         config = checked_config(config)
         _warm_up(arm, config)
         self._ik = InverseKinematics(arm)
+        self._loaded = arm
         super().__init__(arm, config, records, index)
         self._last_numbers: list = []
 

@@ -27,6 +27,7 @@ from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.supervision import supervise
 from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
 from contactsafe.control.touch import follow_touch
+from contactsafe.control.velocity import follow_velocities
 from contactsafe.core.arrays import Matrix, Record
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matmul
@@ -74,9 +75,14 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
     state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
     detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
-    set_step(state.step, params.one_tick, min(state.clock.since, BRIDGE_TICKS + 1.0))
-    narrow_band(state.step, observer.noise.bandwidth)
     untouched = state.mode == FREE and state.touch.touching == 0 and detection.quiet_ticks > 0
+    ticks = state.clock.since
+    if state.clock.bridged == 0:
+        ticks = follow_velocities(
+            observer.velocity, state.arm, ticks, params.clock.dt, untouched, params.observer.velocity_source
+        )
+    set_step(state.step, params.one_tick, min(ticks, BRIDGE_TICKS + 1.0))
+    narrow_band(state.step, observer.noise.bandwidth)
     observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params, untouched)
     if state.clock.bridged > 0:
         return
@@ -153,8 +159,10 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
     Lambda, J_M_inv = task_inertia(dynamics.J, dynamics.M_inv, known.manipulability_floor, known.manipulability_damping)
     J_bar = matmul(J_M_inv.T, Lambda)
     estimate(c, J_bar)
-    follow_tool_force(c.state.tool_wrench, c.state.arm, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain)
     report_arm(c)
+    if c.state.clock.bridged > 0:
+        return
+    follow_tool_force(c.state.tool_wrench, c.state.arm, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain)
     follow_touch(c)
     _report_touch(c.state, c.output)
 

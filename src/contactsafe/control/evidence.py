@@ -29,7 +29,7 @@ _LOGISTIC = 1.702
 """Of a logistic distribution that is nearly the normal one."""
 
 
-class Spread(NamedTuple):
+class Uncertainty(NamedTuple):
     """How well the torque of a contact is known.
 
     Attributes:
@@ -74,7 +74,7 @@ def link_of(handle: Record, index: int, n: int) -> int:
 
 
 @compiled
-def _information(handle: Record, torque: Vector, known: Spread, joints: int, G: Matrix, h: Vector) -> float:
+def _information(handle: Record, torque: Vector, known: Uncertainty, joints: int, G: Matrix, h: Vector) -> float:
     """Fill what a torque tells of a wrench about the origin on a link, G (6, 6) and h (6,); return a constant of it.
 
     A joint with axis a through o feels w · (f, m), w = (o × a, a): G = Σ w wᵀ / σ², h = Σ w τ / σ².
@@ -173,7 +173,7 @@ def _solve(A: Matrix, b: Vector, normal: Vector, f: Vector) -> tuple[float, floa
 
 
 @compiled
-def compare_into(handle: Record, torque: Vector, known: Spread, start: int, stop: int, log: Vector) -> None:
+def compare_into(handle: Record, torque: Vector, known: Uncertainty, start: int, stop: int, log: Vector) -> None:
     """Fill the evidence of part of the places, in the same place of `log`, up to a constant of all.
 
     Args:
@@ -196,7 +196,7 @@ def compare_into(handle: Record, torque: Vector, known: Spread, start: int, stop
 
 
 @compiled
-def force_into(handle: Record, index: int, torque: Vector, known: Spread, point: Vector, force: Vector) -> float:
+def force_into(handle: Record, index: int, torque: Vector, known: Uncertainty, point: Vector, force: Vector) -> float:
     """Fill a point of the surface, world, (3,), m, and the likeliest force there, (3,), N; return its evidence."""
     n = torque.shape[0]
     G, h, A, b, normal = stack_matrix(6, 6), stack_vector(6), stack_matrix(3, 3), stack_vector(3), stack_vector(3)

@@ -7,7 +7,6 @@ import numpy as np
 from contactsafe.control.checks import checked_slot, seconds, shaped
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.params import fill_params
-from contactsafe.control.places import Place, places_of
 from contactsafe.control.presets import safe
 from contactsafe.control.records import controller_dtype
 from contactsafe.control.signals import Measurement
@@ -34,7 +33,6 @@ class Instance(Independent):
     def __init__(self, arm: Arm, config: ControllerConfig, records: np.ndarray | None, index: int) -> None:
         self.arm = arm
         self.config = config
-        self._loaded = arm
         self._nominal = arm.nominal()
         self._records, self._index = checked_slot(arm, records, index)
         self._bind()
@@ -52,22 +50,6 @@ class Instance(Independent):
         """Clear what was measured, remembered and reported."""
         for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
-
-    def places(self, share: float = 0.95) -> list[Place]:
-        """Return where the present contact may be: the places that together have a share of the probability.
-
-        Joint torques alone cannot tell some places apart; the set shrinks as the arm moves on in contact.
-
-        Args:
-            share: of the probability, 0 … 1.
-
-        Returns:
-            Likeliest first; empty where nothing shows in the joints.
-
-        Raises:
-            InvalidInputError: that is no share.
-        """
-        return places_of(self._ticked, self._index, share)
 
     def require_reset(self, measurement: Measurement) -> None:
         """Refuse what is no measurement, and one that comes before a reset.

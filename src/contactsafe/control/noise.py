@@ -1,6 +1,7 @@
 """Noise: what the detecting residual carries while nothing touches the arm, and how much it is filtered for it.
 
-Noise of velocity between 5 and 50 Hz shows in the residual in proportion to its bandwidth. It is measured behind the
+Noise of velocity between 5 and 50 Hz shows in the residual about in proportion to its bandwidth; white noise of torque
+falls only with the root of it, so what is left of that is more than allowed. It is measured behind the
 filters as they are configured, whatever is in force, so that one does not follow the other in circles.
 """
 
@@ -18,7 +19,7 @@ _SLOW_1_S = 25.0
 """What changes more slowly than 4 Hz is not noise: friction, weight, a push."""
 
 _LEARN_S, _KEEP_S = 0.15, 1.0
-"""In so long the noise found may change by a factor of e: in the first second, and later."""
+"""Time in which what is believed of the noise may change by a factor of e: in the first second, and later."""
 
 _PRIOR, _FLOOR = 2.0, 0.2
 """Of what is allowed: the noise that is believed in at first, and the least that is told from none."""

@@ -9,7 +9,7 @@ import numpy as np
 from contactsafe.control.laws import momentum_into, observer_step
 from contactsafe.control.noise import follow_noise, noise_dtype, start_noise
 from contactsafe.control.plausibility import BRIDGE_TICKS
-from contactsafe.control.velocity import follow_velocities, start_velocity, velocity_dtype
+from contactsafe.control.velocity import is_of_middle, start_velocity, velocity_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into
@@ -17,6 +17,9 @@ from contactsafe.core.stack import stack_vector
 
 _f = np.float64
 _i = np.int64
+
+_UNKNOWN = -1
+"""Neither with the rotors nor without: no momentum is compared with the next."""
 
 _GAP = 0.3
 """Fraction of the time between two measurements in which the tool's wrench was not measured that counts as a gap."""
@@ -40,9 +43,10 @@ def observer_dtype(n: int) -> np.dtype:
             ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
             ("impulse", _f, (n,)),  # of the command less friction and β since the last good measurement, N m ticks
             ("impulse_ticks", _f),  # in so many ticks
+            ("impulse_before", _f, (n,)),  # the same between the two measurements before, N m ticks
             ("tau_before", _f, (n,)),  # command at the last good measurement, N m
             ("torque_before", _f, (n,)),  # measured at the joints then, N m
-            ("behind_gears", _i),  # whether it was
+            ("behind_gears", _i),  # whether it was, −1 at first
             ("wrench_before", _f, (6,)),  # on the tool then, N and N m
             ("tool_torque_recent", _f, (n,)),  # largest torque of the tool's wrench of late, N m
             ("tool_torque_unseen", _f, (n,)),  # that a gap in the measurements may have hidden, N m
@@ -59,6 +63,8 @@ def start_observer(observer: Record, command: Record, dynamics: Record, arm: Rec
     start_velocity(observer.velocity, arm.q, arm.qd)
     start_noise(observer.noise, params.observer.residual_noise_nm)
     _momentum_into(observer, dynamics.M, arm, params.arm.rotor, observer.momentum)
+    if arm.has_torque != 0:
+        observer.behind_gears = _UNKNOWN  # what it drives first shows with the next measurement
     for i in range(arm.q.shape[0]):
         observer.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         command.friction[i] = command.tau[i] - observer.beta[i]
@@ -76,6 +82,25 @@ def _momentum_into(observer: Record, M: Matrix, arm: Record, rotor: Vector, out:
         for i in range(rotor.shape[0]):
             out[i] -= rotor[i] * qd[i]
     return out
+
+
+@compiled
+def rebase_momentum(observer: Record, M: Matrix, arm: Record, rotor: Vector, qd: Vector) -> None:
+    """Take the momentum last seen for that of another inertia, at the velocity that it was seen with.
+
+    Args:
+        observer: `observer_dtype` record.
+        M: joint inertia, (n, n), kg m².
+        arm: of the state.
+        rotor: inertia of the rotors, (n,), kg m².
+        qd: the robot's own velocity then, (n,), rad/s.
+    """
+    momentum_into(M, qd, observer.momentum)
+    if observer.velocity.of_positions != 0:
+        momentum_into(M, observer.velocity.qd, observer.momentum)
+    if arm.has_torque != 0:
+        for i in range(rotor.shape[0]):
+            observer.momentum[i] -= rotor[i] * observer.velocity.qd[i]
 
 
 @inlined
@@ -98,14 +123,20 @@ def observe(
     _add_impulse(observer, arm, clock.elapsed, command, dynamics)
     if clock.bridged > 0:
         return
-    follow_velocities(observer.velocity, arm, clock.since, params.clock.dt, untouched, params.observer.velocity_source)
-    same = observer.behind_gears == arm.has_torque  # or the rotors' momentum would come or go at once
+    velocity = observer.velocity
+    # or the momentum of the rotors, or the difference of two velocities, would come or go at once
+    same = observer.behind_gears == arm.has_torque and velocity.changed == 0
     p = _momentum_into(observer, dynamics.M, arm, params.arm.rotor, stack_vector(n))
     tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
     for i in range(n):
         ramp[i] = 0.0 if arm.has_torque != 0 else (command.tau[i] - observer.tau_before[i]) / clock.since
-        rate[i] = (p[i] - observer.momentum[i]) / (clock.since * params.clock.dt)
-        tau_external[i] = rate[i] - observer.impulse[i] / observer.impulse_ticks
+        impulse, ticks, between = observer.impulse[i], observer.impulse_ticks, clock.since
+        if is_of_middle(velocity, i):  # and so is the impulse between two of them
+            impulse, ticks = 0.5 * (impulse + observer.impulse_before[i]), velocity.between
+            between = velocity.between
+        rate[i] = (p[i] - observer.momentum[i]) / (between * params.clock.dt)
+        tau_external[i] = rate[i] - impulse / ticks
+        observer.impulse_before[i] = observer.impulse[i]
         observer.tau_before[i], observer.momentum[i], observer.impulse[i] = command.tau[i], p[i], 0.0
     observer.impulse_ticks = 0.0
     tau_tool[:] = 0.0

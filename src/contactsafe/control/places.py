@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.control.evidence import Spread, force_into, point_into
+from contactsafe.control.evidence import Uncertainty, force_into, point_into
 from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
@@ -29,23 +29,24 @@ class Place(NamedTuple):
     probability: float
 
 
-def places_of(records: np.ndarray, index: int, share: float) -> list[Place]:
-    """Return the most probable places of a contact that together have a share of the probability, likeliest first.
+def places_of(records: np.ndarray, index: int, fraction: float) -> list[Place]:
+    """Return the most probable places of a contact that together have a fraction of the probability, likeliest first.
 
     Args:
         records: `controller_dtype` records, one of them amid a contact.
         index: which.
-        share: of the probability, 0 … 1.
+        fraction: of the probability, 0 … 1.
 
     Raises:
-        InvalidInputError: that is no share.
+        InvalidInputError: that is no fraction.
     """
-    if not isinstance(share, int | float) or not 0.0 < share <= 1.0:
-        raise InvalidInputError(f"share = {share!r} of the probability; give more than 0 and at most 1")
+    if not isinstance(fraction, int | float) or not 0.0 < fraction <= 1.0:
+        raise InvalidInputError(f"fraction = {fraction!r} of the probability; give more than 0 and at most 1")
     record = records[index]
     state, handle = record["state"], record["handle"]
-    points = min(int(handle["place_points"]), state["localisation"]["now"].size)
+    points = int(handle["place_points"])
     if not state["touch"]["touching"] or state["localisation"]["best"] < 0:
+        _list(records, index, np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))  # compiles
         return []
     n = len(state["arm"]["q"])
     weights, links = np.zeros(points), np.zeros(points, dtype=np.int64)
@@ -54,7 +55,7 @@ def places_of(records: np.ndarray, index: int, share: float) -> list[Place]:
     probability = np.exp(weights - weights.max())
     probability /= probability.sum()
     order = np.argsort(-probability, kind="stable")
-    count = int(np.searchsorted(np.cumsum(probability[order]), share * (1.0 - 1e-12))) + 1
+    count = int(np.searchsorted(np.cumsum(probability[order]), fraction * (1.0 - 1e-12))) + 1
     return [
         Place(min(int(links[k]), n), bool(links[k] > n), point[k], force[k], float(probability[k]))
         for k in order[:count]
@@ -66,7 +67,7 @@ def _list(records: np.ndarray, index: int, weights: Vector, links: np.ndarray, p
     """Fill the log of each point's weight, its link, where it is and the likeliest force there."""
     c = records[index]
     found, n = c.state.localisation, c.state.arm.q.shape[0]
-    known, normal = Spread(found.sigma, found.moment_variance), stack_vector(3)
+    known, normal = Uncertainty(found.sigma, found.moment_variance), stack_vector(3)
     for k in range(weights.shape[0]):
         weights[k] = found.log[k]
         links[k] = point_into(c.handle, k, n, point[k], normal)

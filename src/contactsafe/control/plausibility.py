@@ -12,6 +12,9 @@ from contactsafe.core.compiled import compiled
 BRIDGE_TICKS = 20
 """Ticks in a row that are bridged at most; after more of them the arm is braked until it is reset."""
 
+_MOST_TORQUE = 10.0
+"""Multiple of a joint's torque limit beyond which no sensor of it is believed."""
+
 OVERDUE_TICKS = BRIDGE_TICKS + 1.5
 
 SLACK_RAD = 1.5e-4
@@ -22,6 +25,9 @@ UNTRUE_RAD = 1e-3
 
 _JUMP_NM = 10.0
 """A change of velocity that takes more than this a tick must show in the positions as well."""
+
+_NOISE_RAD_S = 0.03
+"""By so much a real robot's velocity may jump by noise alone: five times the 4 to 6 mrad/s of a Panda's."""
 
 _AT_REST_RAD_S = 1e-6
 """Only a simulator stands as still as this; what it says twice is true twice."""
@@ -48,7 +54,12 @@ def is_usable(m: Record, arm: Record, braking: int) -> bool:
         return False
     if braking != 0:
         return True
-    return (m.has_wrench == 0 or all_usable(m.wrench_ee)) and (m.has_torque == 0 or all_usable(m.torque))
+    if m.has_wrench != 0 and not all_usable(m.wrench_ee):
+        return False
+    for i in range(m.torque.shape[0]):
+        if m.has_torque != 0 and not abs(m.torque[i]) < _MOST_TORQUE * arm.tau_max[i]:  # NaN as well
+            return False
+    return True
 
 
 @compiled
@@ -103,7 +114,7 @@ def velocity_jumps(clock: Record, m: Record, M: Matrix, time: float, dt: float) 
     """Tell whether a joint's velocity changed as nothing but a large torque changes it, and its position denies it."""
     for i in range(m.q.shape[0]):
         jump = m.qd[i] - clock.qd_good[i]
-        if abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
+        if abs(jump) > _NOISE_RAD_S and abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
             shown = (m.q[i] - clock.q_good[i]) / time - clock.qd_good[i]
             if shown * jump < 0.25 * jump * jump:
                 return True

@@ -17,7 +17,7 @@ from contactsafe.control.impedance import impedance_dtype
 from contactsafe.control.isolation import isolation_dtype
 from contactsafe.control.limits import limits_dtype
 from contactsafe.control.link_masses import link_masses_dtype
-from contactsafe.control.localisation import MAX_POINTS, localisation_dtype
+from contactsafe.control.localisation import localisation_dtype
 from contactsafe.control.observer import observer_dtype
 from contactsafe.control.params import params_dtype, step_dtype
 from contactsafe.control.payload import known_payload_dtype, payload_dtype
@@ -164,7 +164,7 @@ def controller_dtype(n: int) -> np.dtype:
 def index_bounds(controller: np.void) -> dict[str, tuple[float, float]]:
     """Return by name what those integers of a `controller_dtype` record may be that compiled code indexes with."""
     n, handle = len(controller["output"]["torque"]), controller["handle"]
-    points, places = int(handle["surface_points"]), min(int(handle["place_points"]), MAX_POINTS)
+    points, places = int(handle["surface_points"]), int(handle["place_points"])
     return {
         "state.turn": (0, n - 1),
         "state.mode": (FREE, REJECT),

@@ -1,5 +1,6 @@
 """What goes into a step of the controller, and what comes out."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -56,10 +57,12 @@ class Contact(NamedTuple):
             obstacle until receding from it has shown that it pushes; 'tool' where the tool alone touches something;
             'none'.
         torque: estimated joint torque of the contact, (n,), N m (the fast residual).
-        probability: of the kind's being right as to arm or tool.
+        probability: of the kind's being right as to arm or tool; like point and force by `ContactEstimator` alone, NaN
+            by the controller.
         point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints.
-            `places()` gives the others that explain the torques.
+            `ContactEstimator.places()` gives the others that explain the torques.
         force: of the environment there, as far as joint torques tell it, world, (3,), N.
+        bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
     """
 
     in_contact: bool
@@ -69,10 +72,11 @@ class Contact(NamedTuple):
     probability: float
     point: np.ndarray
     force: np.ndarray
+    bridged: int = 0
 
     @property
     def touched(self) -> bool:
-        """Whether anything touches the arm or its tool."""
+        """Whether anything touches arm or tool now; a law may stay in force for a while after it (`in_contact`)."""
         return self.kind != "none"
 
 
@@ -108,16 +112,22 @@ class Output(NamedTuple):
 _LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum_ in range(2 * max(LIMITS))]
 
 
-def contact_of(out: dict[str, np.ndarray]) -> Contact:
-    """Return what a tick reports of a contact, from the fields of an `output_dtype` record."""
+def contact_of(out: dict[str, np.ndarray], placed: bool) -> Contact:
+    """Return what a tick reports of a contact, from the fields of an `output_dtype` record.
+
+    Args:
+        out: the fields.
+        placed: whether the contact's place was looked for, as the estimator does and the controller does not.
+    """
     return Contact(
         in_contact=bool(out["mode"] != FREE),
         link=int(out["link"]),
         kind=KINDS[int(out["kind"])],
         torque=out["residual_fast"].copy(),
-        probability=float(out["probability"]),
-        point=out["point"].copy(),
-        force=out["force"].copy(),
+        probability=float(out["probability"]) if placed else math.nan,
+        point=out["point"].copy() if placed else np.full(3, np.nan),
+        force=out["force"].copy() if placed else np.full(3, np.nan),
+        bridged=int(out["bridged"]),
     )
 
 
@@ -125,7 +135,7 @@ def output_of(out: dict[str, np.ndarray]) -> Output:
     """Return what a tick reports, from the fields of an `output_dtype` record."""
     return Output(
         torque=out["torque"].copy(),
-        contact=contact_of(out),
+        contact=contact_of(out, placed=False),
         residual=out["residual"].copy(),
         error=out["error"].copy(),
         limited_by=_LIMITED_BY[int(out["limited_by"])],

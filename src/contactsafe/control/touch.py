@@ -7,7 +7,7 @@ import numpy as np
 from contactsafe.control.baseline import follow_baseline
 from contactsafe.control.codes import FREE, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
 from contactsafe.control.detection import GRAVITY_SIGMAS
-from contactsafe.control.evidence import Spread, moment_variance
+from contactsafe.control.evidence import Uncertainty, moment_variance
 from contactsafe.control.localisation import forget_place, localise
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import inlined
@@ -17,8 +17,12 @@ from contactsafe.core.stack import stack_vector
 _f = np.float64
 _i = np.int64
 
-_TOOL_PRIOR, _TOOL_PRIOR_SEEN = 0.4, 0.02
-"""Probability that what touches is at the tool, before anything is known; and where a sensor takes that out."""
+_TOOL_PRIOR, _TOOL_PRIOR_SEEN, _NEVER_TOOL = 0.4, 0.02, 1e-6
+"""Probability that what touches is at the tool, before anything is known; where a sensor takes that out; and where
+detection has told that it is the arm."""
+
+_QUIET_S = 0.02
+"""A touch ends after so long below what keeps it."""
 
 _LEAST_NM, _ELSEWHERE_NM, _SCALE = 0.05, 0.2, 0.02
 """Standard deviation of a residual beside noise: anywhere, where no baseline holds, and as a fraction of itself."""
@@ -54,15 +58,23 @@ def follow_touch(c: Record) -> None:
     touch.ticks += ticks
     touch.quiet_ticks = 0 if shows else touch.quiet_ticks + ticks
     began = touch.touching == 0 and shows
-    ended = touch.touching != 0 and touch.ticks >= params.detection.dwell_ticks and not shows
+    quiet = touch.quiet_ticks * params.clock.dt > _QUIET_S
+    ended = touch.touching != 0 and touch.ticks >= params.detection.dwell_ticks and quiet
     if began or ended:
         touch.touching, touch.ticks = 1 if began else 0, 0
         forget_place(place, state.arm.q)
-    if touch.touching != 0:
-        prior = _TOOL_PRIOR_SEEN if state.arm.has_wrench != 0 else _TOOL_PRIOR
-        known = Spread(sigma, moment_variance(changed))
-        localise(place, c.handle, changed, known, state.arm.q, prior, state.step.dt)
+    if touch.touching != 0 and c.handle.place_points > c.handle.tool_places:
+        known = Uncertainty(sigma, moment_variance(changed))
+        localise(place, c.handle, changed, known, state.arm.q, _tool_prior(state, params.observer), state.step.dt)
     touch.kind, touch.probability = _kind(touch, place, state, params.classification.tool_contact_n)
+
+
+@inlined
+def _tool_prior(state: Record, params: Record) -> float:
+    """Return how probable the tool is before the torques are asked."""
+    if state.mode != FREE:
+        return _NEVER_TOOL
+    return _TOOL_PRIOR_SEEN if state.arm.has_wrench != 0 and params.cancel_tool_wrench != 0 else _TOOL_PRIOR
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Velocity: that of the robot's own signal, or the difference of its positions, whichever is quieter.
 
-Two measurements of one velocity tell the noise of both: white noise σ_q of positions shows in their third difference,
-which no motion of an arm does within a tick, and what else they differ by is the robot's.
+Two measurements of one velocity tell the noise of both. White noise σ_q of positions shows in their third difference,
+less what the robot's velocity says of the motion in it; by what else the two differ, the robot's signal is off.
 """
 
 import numpy as np
@@ -21,13 +21,16 @@ _ROBOT, _POSITIONS, _QUIETER_OF_TWO = 0, 1, 2
 _BAND_1_S = 300.0
 """Noise is compared below 50 Hz: what is faster the observer filters anyway."""
 
-_MEMORY_TICKS = 1000.0
+_MEMORY_S = 1.0
 
 _IN_TIME = (0.3, 2.5)
 """Ticks between two measurements that are compared."""
 
-_LEAST_TICKS = 20.0
-"""After so many both are compared first."""
+_LEAST_S, _LEAST_TICKS = 0.02, 10.0
+"""After so long, and so many measurements, both are compared first."""
+
+_NONE = 1e-9
+"""A variance of noise that is none, rad²/s²."""
 
 _QUIETER = 0.5
 """A source takes over where its variance is less than this fraction of the other's."""
@@ -42,10 +45,16 @@ def velocity_dtype(n: int) -> np.dtype:
             ("q_before", _f, (n,)),  # rad
             ("qd_before", _f, (n,)),  # of the robot, rad/s
             ("difference", _f, (n, 2)),  # of positions, the last one in a tick, and its change, rad
+            ("apart_difference", _f, (n, 2)),  # the same of what positions differ by from the robot's velocity, rad
             ("apart", _f, (n,)),  # the robot's less that of positions, below 50 Hz, rad/s
             ("apart_variance", _f, (n,)),  # rad²/s²
             ("third_variance", _f, (n,)),  # of the third difference, rad²
             ("ticks", _f),  # in a row that were measured in time
+            ("since_before", _f),  # ticks between the last two measurements
+            ("between", _f),  # ticks between the middles of the last two gaps
+            ("fresh", _i),  # 1 until the first measurement was taken
+            ("changed", _i),  # whether a joint has another source than at the last measurement
+            ("of_positions", _i),  # whether any joint's is that of positions
         ]
     )
 
@@ -54,11 +63,11 @@ def velocity_dtype(n: int) -> np.dtype:
 def start_velocity(velocity: Record, q: Vector, qd: Vector) -> None:
     """Begin with the robot's signal."""
     velocity.qd[:], velocity.q_before[:], velocity.qd_before[:] = qd, q, qd
-    velocity.ticks = 0.0
+    velocity.ticks, velocity.since_before, velocity.between, velocity.fresh = 0.0, 1.0, 1.0, 1
 
 
 @inlined
-def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, untouched: bool, choice: int) -> None:
+def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, untouched: bool, choice: int) -> float:
     """Take a measurement over and choose the velocity in force of each joint.
 
     Args:
@@ -66,34 +75,51 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
         since, dt: ticks that passed since the last measurement, and how long one is, s.
         untouched: whether nothing touches the arm; else nothing is learned of the noise.
         choice: place in `VELOCITY_SOURCES`.
+
+    Returns:
+        Ticks between the velocities in force now and before.
     """
-    if choice == _ROBOT:
-        velocity.qd[:] = arm.qd
-        return
+    velocity.changed = 0
+    if choice == _ROBOT or velocity.fresh != 0:
+        velocity.qd[:], velocity.fresh = arm.qd, 0
+        return since
     in_time = _IN_TIME[0] < since < _IN_TIME[1]
     velocity.ticks = velocity.ticks + 1.0 if in_time else 0.0
-    learning, band = in_time and untouched and velocity.ticks > 3.0, filter_gain(_BAND_1_S, dt)
+    learning, velocity.of_positions = in_time and untouched and velocity.ticks > 3.0, 0
     for i in range(arm.q.shape[0]):
         by_positions = (arm.q[i] - velocity.q_before[i]) / (since * dt)
-        apart = 0.5 * (arm.qd[i] + velocity.qd_before[i]) - by_positions
-        _compare(velocity, i, by_positions * dt, apart, band, learning)
-        if choice != _QUIETER_OF_TWO:
-            velocity.source[i] = choice
-        elif velocity.ticks > _LEAST_TICKS:
-            velocity.source[i] = _quieter(velocity, i, band, dt)
-        velocity.qd[i] = by_positions if velocity.source[i] == _POSITIONS else arm.qd[i]
+        _compare(velocity, i, by_positions, 0.5 * (arm.qd[i] + velocity.qd_before[i]), dt, learning)
+        source = choice
+        if choice == _QUIETER_OF_TWO:
+            known = velocity.ticks > max(_LEAST_TICKS, _LEAST_S / dt)
+            source = _quieter(velocity, i, dt) if known else velocity.source[i]
+        velocity.changed = 1 if source != velocity.source[i] else velocity.changed
+        velocity.source[i], velocity.qd[i] = source, arm.qd[i]
+        if source == _POSITIONS:
+            velocity.qd[i], velocity.of_positions = by_positions, 1
     velocity.q_before[:], velocity.qd_before[:] = arm.q, arm.qd
+    velocity.between, velocity.since_before = 0.5 * (since + velocity.since_before), since
+    return velocity.between if velocity.of_positions != 0 else since
 
 
 @inlined
-def _compare(velocity: Record, i: int, moved: float, apart: float, band: float, learning: bool) -> None:
-    """Follow joint i's third difference of positions, and what its two velocities differ by."""
-    velocity.apart[i] += band * (apart - velocity.apart[i])
-    third = _third_difference(velocity.difference[i], moved)
+def is_of_middle(velocity: Record, i: int) -> bool:
+    """Tell whether joint i's velocity is of the middle between two measurements, as a difference of positions is."""
+    return velocity.source[i] == _POSITIONS
+
+
+@inlined
+def _compare(velocity: Record, i: int, by_positions: float, by_robot: float, dt: float, learning: bool) -> None:
+    """Follow the noise of joint i's positions, and what its two velocities differ by."""
+    apart = by_robot - by_positions
+    velocity.apart[i] += filter_gain(_BAND_1_S, dt) * (apart - velocity.apart[i])
+    third = _third_difference(velocity.difference[i], by_positions * dt)
+    beside_motion = _third_difference(velocity.apart_difference[i], -apart * dt)
+    squared = min(third * third, beside_motion * beside_motion)
     if learning:
-        gain = 1.0 / min(max(velocity.ticks - 3.0, 1.0), _MEMORY_TICKS)
+        gain = max(1.0 / max(velocity.ticks - 3.0, 1.0), dt / _MEMORY_S)
         velocity.apart_variance[i] += gain * (velocity.apart[i] * velocity.apart[i] - velocity.apart_variance[i])
-        velocity.third_variance[i] += gain * (third * third - velocity.third_variance[i])
+        velocity.third_variance[i] += gain * (squared - velocity.third_variance[i])
 
 
 @inlined
@@ -105,14 +131,15 @@ def _third_difference(difference: Vector, first: float) -> float:
 
 
 @inlined
-def _quieter(velocity: Record, i: int, band: float, dt: float) -> int:
+def _quieter(velocity: Record, i: int, dt: float) -> int:
     """Return the source whose noise below 50 Hz is less; the one in force where they hardly differ.
 
     White noise of positions has a third difference of variance 20 σ_q²; as a velocity behind a first-order filter that
     takes up a fraction a, it has 2 a² / (2 − a) σ_q² / dt².
     """
+    band = filter_gain(_BAND_1_S, dt)
     of_positions = 2.0 * band * band / (2.0 - band) * velocity.third_variance[i] / (20.0 * dt * dt)
     of_robot = max(velocity.apart_variance[i] - of_positions, 0.0)
-    if of_positions < _QUIETER * of_robot:
+    if of_positions < _QUIETER * of_robot and of_robot > _NONE:
         return _POSITIONS
     return _ROBOT if of_robot <= _QUIETER * of_positions else int(velocity.source[i])

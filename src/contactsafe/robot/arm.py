@@ -71,7 +71,7 @@ class Arm(Independent):
         tool: what the flange carries; None likewise.
         surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
         places: where something may touch the links or, last, the tool, (P, 7), see `contactsafe.robot.touchable`; by
-            default the surface and what the tool says.
+            default the surface and what the tool says. Where another tool or surface replaces them, give none.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.surface import SURFACE_COLUMNS
+from contactsafe.robot.touchable import MAX_PLACES
 
 _MODEL = (
     "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -86,8 +87,16 @@ def refuse_unsound(arm: Any) -> None:
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
-    if not (np.isfinite(arm.surface).all() and np.isfinite(arm.places).all()):
-        raise InvalidInputError(f"surface of arm '{arm.name}' has a number that is not finite; give finite points")
+    for rows, name in ((arm.surface, "surface"), (arm.places, "places")):
+        if not np.isfinite(rows).all():
+            raise InvalidInputError(f"{name} of arm '{arm.name}' has a number that is not finite; give finite points")
+        if not np.isin(rows[:, 0], np.arange(arm.n + 1)).all():
+            raise InvalidInputError(f"{name} of arm '{arm.name}' has a link that is none of 0 to {arm.n}")
+    of_tool = arm.places[:, 0] == 0
+    if not 0 < len(arm.places) <= MAX_PLACES or not of_tool[-1] or (np.diff(of_tool.astype(int)) < 0).any():
+        raise InvalidInputError(
+            f"places of arm '{arm.name}' are {len(arm.places)}; give at most {MAX_PLACES}, the tool's (link 0) last"
+        )
     if not 0.0 <= arm.lever_doubted < np.inf:
         raise InvalidInputError(f"lever_doubted = {arm.lever_doubted:g} m; give a finite number from 0 on")
 

@@ -14,7 +14,7 @@ SURFACE_COLUMNS = 7
 
 _ALONG, _AROUND = 5, 12
 
-_POINTS = 480
+POINTS = 480
 """Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
 
 _STARTS, _DIRECTIONS = 1000, 5
@@ -71,7 +71,7 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
         if len(points := _surface(seen, data, shown_geoms(model, link_of == link))):
             found[link] = points
     for link, points in found.items():
-        points = spread(points, _POINTS // len(found))
+        points = spread(points, POINTS // len(found))
         points[:, :3] -= origins[link - 1]
         rows.append(np.insert(points, 0, link, axis=1))
     return np.concatenate(rows)

@@ -6,10 +6,10 @@ import math
 import numpy as np
 
 from contactsafe.robot.description import ArmDescription, Capsule, Tool
-from contactsafe.robot.surface import SURFACE_COLUMNS, on_sphere, spread
+from contactsafe.robot.surface import POINTS, SURFACE_COLUMNS, on_sphere, spread
 
-_POINTS = 480
-"""Of an arm's links: comparing them takes time. On a Panda they are 3 cm apart."""
+MAX_PLACES = 704
+"""Of an arm and its tool, that the controller's records have room for."""
 
 _TOOL_POINTS = 60
 """Of a tool's capsules; its tip has corners and edges beside them."""
@@ -33,9 +33,9 @@ def touchable(links: np.ndarray, tool: Tool | None) -> np.ndarray:
 
 
 def capsule_places(description: ArmDescription) -> np.ndarray:
-    """Spread points over the capsules of an arm's links, as many per area everywhere, (480, 7).
+    """Spread some 480 points over the capsules of an arm's links, as many per area everywhere, (P, 7).
 
-    Link 1 is left out: what touches it can only turn it about its own axis, and joint torques show next to nothing.
+    Link 1 is left out as in `capsule_surface`. On a Panda the points are 3 cm apart.
     """
     rng = np.random.default_rng(0)
     dense = {
@@ -45,7 +45,7 @@ def capsule_places(description: ArmDescription) -> np.ndarray:
     }
     total = sum(len(points) for points in dense.values())
     rows = [
-        np.insert(spread(points, round(_POINTS * len(points) / total)), 0, link, axis=1)
+        np.insert(spread(points, round(POINTS * len(points) / total)), 0, link, axis=1)
         for link, points in dense.items()
     ]
     return np.concatenate([np.zeros((0, SURFACE_COLUMNS)), *rows])

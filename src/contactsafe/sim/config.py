@@ -36,8 +36,9 @@ class PlantConfig:
         if self.torque_delay_ticks not in (0, 1):
             raise InvalidInputError(f"torque_delay_ticks = {self.torque_delay_ticks}; give 0 or 1")
         friction, inertia = np.atleast_1d(self.friction_scale), np.atleast_1d(self.inertia_scale)
-        if not (np.atleast_1d(self.stiction_nm) >= 0).all():
-            raise InvalidInputError(f"stiction_nm = {self.stiction_nm} drives joints; give numbers ≥ 0, N m")
+        stiction = np.atleast_1d(self.stiction_nm)
+        if not ((stiction >= 0) & np.isfinite(stiction)).all():
+            raise InvalidInputError(f"stiction_nm = {self.stiction_nm} is no friction; give finite numbers ≥ 0, N m")
         if not (friction >= 0).all() or not (inertia > 0).all() or not math.isfinite(self.payload_kg):
             raise InvalidInputError(
                 f"plant (friction × {self.friction_scale}, inertia × {self.inertia_scale}, "

@@ -28,9 +28,10 @@ _i = np.int64
 def noise_channels(n: int, sensors: SensorConfig | None = None) -> int:
     """Count the random numbers one tick needs: q, q̇ and torque of n joints, force, moment, accelerometer.
 
-    Sensors of the joints' torque need n more, which come last.
+    Sensors at the joints need 2 n more, which come last: of torque, and of velocity in its band.
     """
-    return 3 * n + 9 + (n if sensors is not None and sensors.joint_torque else 0)
+    more = sensors is not None and (sensors.joint_torque or sensors.velocity_band_rad_s > 0.0)
+    return 3 * n + 9 + (2 * n if more else 0)
 
 
 @functools.cache
@@ -107,12 +108,12 @@ def sense(world: Record, controller: Record, noise: Vector) -> None:
         if errors.encoder_step > 0.0:
             q = errors.encoder_step * math.floor(q / errors.encoder_step + 0.5)
         qd = truth.qd[i] + errors.qd_sigma * noise[n + i]
-        if errors.joints.band_sigma > 0.0:
-            qd += velocity_noise(errors.joints, i, noise[n + i], controller.params.clock.dt)
         if errors.velocity_filter_gain > 0.0:
             rate = 0.0 if world.tick == 0 else (q - errors.q_seen[i]) / controller.params.clock.dt
             qd = errors.qd_seen[i] + errors.velocity_filter_gain * (rate - errors.qd_seen[i])
         errors.q_seen[i], errors.qd_seen[i] = q, qd
+        if errors.joints.band_sigma > 0.0:
+            qd += velocity_noise(errors.joints, i, noise[4 * n + 9 + i], controller.params.clock.dt)
         measurement.q[i], measurement.qd[i] = q, qd
     measurement.has_wrench = errors.has_wrist
     if errors.has_wrist != 0:

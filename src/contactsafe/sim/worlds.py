@@ -117,8 +117,8 @@ class Worlds(Independent):
         for record, model, config in zip(self.records, self.models, self.configs, strict=True):
             fill_plant(record["plant"], model, config)
             fill_errors(record["errors"], arm, config, TICK_S)
-        channels = max(noise_channels(arm.n, config.sensors) for config in self.configs)
-        self._noise = np.zeros((n, MAX_TICKS, channels))
+        self._channels = [noise_channels(arm.n, config.sensors) for config in self.configs]
+        self._noise = np.zeros((n, MAX_TICKS, max(self._channels)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
         self._threads = Threads(min(n, os.cpu_count() or 1))
         self.backends = [backend(arm, config, TICK_S) for config in self.configs] if backend else []
@@ -220,8 +220,12 @@ class Worlds(Independent):
 
     def sample_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Sample the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
-        for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
-            rng.standard_normal(out=noise)
+        for i in range(self.n)[start:stop]:
+            noise, channels = self._noise[i], self._channels[i]
+            if channels == noise.shape[1]:
+                self.rngs[i].standard_normal(out=noise)
+            else:  # a world's noise depends on nothing but its own sensors
+                noise[:, :channels] = self.rngs[i].standard_normal((len(noise), channels))
         return self._noise
 
     def in_threads(self, run: Callable[[int, int], None]) -> None:
