@@ -71,18 +71,24 @@ def latch(state: Record, fault: int) -> None:
 
 
 @inlined
-def estimate(c: Record, J_bar: Matrix) -> None:
-    """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
-    state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
-    detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
-    untouched = state.mode == FREE and state.touch.touching == 0 and detection.quiet_ticks > 0
-    ticks = state.clock.since
+def _set_time(state: Record, params: Record, untouched: bool) -> None:
+    """Take the velocity in force, and set the step to the time between it and the one before."""
+    observer, ticks = state.observer, state.clock.since
     if state.clock.bridged == 0:
         ticks = follow_velocities(
             observer.velocity, state.arm, ticks, params.clock.dt, untouched, params.observer.velocity_source
         )
     set_step(state.step, params.one_tick, min(ticks, BRIDGE_TICKS + 1.0))
     narrow_band(state.step, observer.noise.bandwidth)
+
+
+@inlined
+def estimate(c: Record, J_bar: Matrix) -> None:
+    """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
+    state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
+    detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
+    untouched = state.mode == FREE and state.touch.touching == 0 and detection.quiet_ticks > 0
+    _set_time(state, params, untouched)
     observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params, untouched)
     if state.clock.bridged > 0:
         return

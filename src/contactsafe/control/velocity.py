@@ -32,6 +32,9 @@ _LEAST_S, _LEAST_TICKS = 0.02, 10.0
 _NONE = 1e-9
 """A variance of noise that is none, rad²/s²."""
 
+_RESUMED = 2.0
+"""Measurements in time after a gap, from which on differences of positions are compared again."""
+
 _QUIETER = 0.5
 """A source takes over where its variance is less than this fraction of the other's."""
 
@@ -53,7 +56,7 @@ def velocity_dtype(n: int) -> np.dtype:
             ("since_before", _f),  # ticks between the last two measurements
             ("between", _f),  # ticks between the middles of the last two gaps
             ("fresh", _i),  # 1 until the first measurement was taken
-            ("changed", _i),  # whether a joint has another source than at the last measurement
+            ("changed", _i),  # whether those in force now and before are not to be compared
             ("of_positions", _i),  # whether any joint's is that of positions
         ]
     )
@@ -98,6 +101,8 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
         if source == _POSITIONS:
             velocity.qd[i], velocity.of_positions = by_positions, 1
     velocity.q_before[:], velocity.qd_before[:] = arm.q, arm.qd
+    if velocity.ticks < _RESUMED and velocity.of_positions != 0:
+        velocity.changed = 1
     velocity.between, velocity.since_before = 0.5 * (since + velocity.since_before), since
     return velocity.between if velocity.of_positions != 0 else since
 
