@@ -57,6 +57,8 @@ def fill(text: str) -> str:
 def _text(value) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
     if isinstance(value, tuple):
         return ", ".join(f"{number:g}" for number in value)
     return f"{value:g}".replace("inf", "∞")

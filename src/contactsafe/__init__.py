@@ -7,6 +7,7 @@ from contactsafe.core import telemetry as _telemetry  # noqa: F401  before any d
 from contactsafe import tasks as _tasks  # noqa: F401  which Gymnasium then knows
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
+from contactsafe.control.contact_estimator import ContactEstimator
 from contactsafe.control.controller import Controller
 from contactsafe.control.signals import Contact, Measurement, Output, Target
 from contactsafe.core.errors import ContactSafeError
@@ -17,6 +18,6 @@ from contactsafe.robot.payload import Payload
 __version__ = "0.1.0"
 
 __all__ = [
-    "Arm", "Contact", "ContactSafeError", "Controller", "ControllerConfig", "Measurement", "Output", "Payload",
-    "Pose", "Target", "presets", "robots",
+    "Arm", "Contact", "ContactEstimator", "ContactSafeError", "Controller", "ControllerConfig", "Measurement", "Output",
+    "Payload", "Pose", "Target", "presets", "robots",
 ]  # fmt: skip

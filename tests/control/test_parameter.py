@@ -19,12 +19,21 @@ class Example(Stage):
     on: bool = parameter(True, "", "a switch")
     span: tuple[float, float] = parameter((1.0, 2.0), "m", "a range")
     each: tuple[float, ...] = parameter((3.0, 4.0), "N m", "one a joint", per_joint=True)
+    source: str = parameter("near", "", "a choice", choices=("far", "near"))
 
 
 def test_record_holds_every_parameter_for_any_number_of_joints():
     record = np.zeros((), dtype=record_fields(Example, 3))
     fill_record(record, Example())
-    assert [record[name].tolist() for name in record.dtype.names] == [2.0, 0.5, np.inf, 1, [1.0, 2.0], [3.0, 4.0, 4.0]]
+    assert [record[name].tolist() for name in record.dtype.names] == [
+        2.0,
+        0.5,
+        np.inf,
+        1,
+        [1.0, 2.0],
+        [3.0, 4.0, 4.0],
+        1,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -35,6 +44,8 @@ def test_record_holds_every_parameter_for_any_number_of_joints():
         ({"part": 1.5}, "part = 1.5 is no fraction; give more than 0 and at most 1"),
         ({"bound": -1.0}, "bound = -1.0 has a negative number or NaN; give numbers ≥ 0"),
         ({"span": (2.0, 1.0)}, "span = (2.0, 1.0) is empty; give (lowest, highest)"),
+        ({"source": "middle"}, "source = 'middle' is no choice; give one of far, near"),
+        ({"source": 1}, "source = 1 is no choice; give one of far, near"),
         ({"each": 3.0}, "each = 3.0 has the wrong shape; give one number a joint"),
     ],
 )

@@ -174,6 +174,9 @@ def _accept(state: Record, m: Record, dt: float, since: float, timed: bool) -> N
     arm.has_wrench = 1 if m.has_wrench != 0 and all_usable(m.wrench_ee) else 0
     if arm.has_wrench != 0:
         arm.wrench_ee[:] = m.wrench_ee
+    arm.has_torque = 1 if m.has_torque != 0 and all_usable(m.torque) else 0
+    if arm.has_torque != 0:
+        arm.torque[:] = m.torque
 
 
 @compiled
@@ -189,11 +192,20 @@ def set_step(step: Record, one_tick: Record, ticks: float) -> None:
     step.detection_filter_gain = _over(one_tick.detection_filter_gain, ticks)
     step.compensation_filter_gain = _over(one_tick.compensation_filter_gain, ticks)
     step.lowpass_gain = _over(one_tick.lowpass_gain, ticks)
+    step.full_filter_gain, step.full_lowpass_gain = step.detection_filter_gain, step.lowpass_gain
     step.recover_gain = _over(one_tick.recover_gain, ticks)
     step.probe_gain = _over(one_tick.probe_gain, ticks)
     step.reject_recover_gain = _over(one_tick.reject_recover_gain, ticks)
     step.tool_memory_gain = _over(one_tick.tool_memory_gain, ticks)
     step.torque_step = one_tick.torque_step * min(ticks, 1.0)
+
+
+@compiled
+def narrow_band(step: Record, bandwidth: float) -> None:
+    """Let what detects take in so much less: its filters as if only a fraction of the time had passed."""
+    if bandwidth < 1.0:
+        step.detection_filter_gain = _over(step.full_filter_gain, bandwidth)
+        step.lowpass_gain = _over(step.full_lowpass_gain, bandwidth)
 
 
 @compiled

@@ -7,6 +7,7 @@ from typing import Any
 
 from contactsafe.control.damping import GAIN_MARGIN, largest_damping
 from contactsafe.control.parameter import Stage, from_text, parameter
+from contactsafe.control.velocity import VELOCITY_SOURCES
 from contactsafe.core.errors import InvalidInputError
 
 _INF = math.inf
@@ -36,6 +37,14 @@ class ObserverConfig(Stage):
     detection_gain: float = parameter(
         1.5, "1/s", "K_I of the residual that detects, isolates and gives the direction", positive=True, infinite=True
     )
+    velocity_source: str = parameter(
+        "robot", "", "where the residuals take the joints' velocity from: the robot's own signal, the difference of "
+        "its positions, or of the two the quieter one, joint by joint", choices=VELOCITY_SOURCES,
+    )  # fmt: skip
+    residual_noise_nm: float = parameter(
+        _INF, "N m", "noise of the detecting residual, standard deviation, beyond which it is filtered more; measured "
+        "while nothing touches the arm", positive=True, infinite=True,
+    )  # fmt: skip
     residual_cutoff_hz: float = parameter(30.0, "Hz", "low-pass behind both residuals", positive=True, infinite=True)
     cancel_tool_wrench: bool = parameter(
         True, "", "take the measured tool wrench out of the residual, (14), so that it shows the arm alone"

@@ -6,23 +6,18 @@ from numpy.typing import ArrayLike
 from contactsafe.control.checks import (
     believable,
     checked_gain,
-    checked_slot,
     in_range,
     numbers_of,
     refuse_overload,
-    seconds,
-    shaped,
     within_limit,
 )
 from contactsafe.control.config import ControllerConfig
-from contactsafe.control.params import OUTSIDE_RAD, fill_params, mass_variance
+from contactsafe.control.instance import Instance, checked_config, views
+from contactsafe.control.params import OUTSIDE_RAD, mass_variance
 from contactsafe.control.payload import payload_weight_into
 from contactsafe.control.payload_change import take_up
-from contactsafe.control.presets import safe
-from contactsafe.control.records import controller_dtype
 from contactsafe.control.signals import Measurement, Output, Target, output_of
 from contactsafe.control.tick import tick_at
-from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm, unit_quaternion
 from contactsafe.robot.ik import InverseKinematics
@@ -44,7 +39,7 @@ _SAME_PLACE = 0.5
 """An arm that is less than this away from where it was last measured, rad, may have got there by itself."""
 
 
-class Controller(Independent):
+class Controller(Instance):
     """A contact-safe Cartesian variable impedance controller for one arm.
 
     The first one for arms of so many joints compiles what a step needs, or loads it, which is said when it takes long.
@@ -60,36 +55,22 @@ class Controller(Independent):
         record: everything the controller is made of; copy its `state` to save it.
     """
 
-    _bound = ("record", "_ticked", "_measured", "_reported", "_kept")
+    _bound = (*Instance._bound, "_kept")
 
     def __init__(
         self, arm: Arm, config: ControllerConfig | None = None, records: np.ndarray | None = None, index: int = 0
     ) -> None:
         require_arm(arm)
-        config = safe() if config is None else config
-        if not isinstance(config, ControllerConfig):
-            raise InvalidInputError(
-                f"config is {type(config).__name__}; give a ControllerConfig such as contactsafe.presets.safe()"
-            )
+        config = checked_config(config)
         _warm_up(arm, config)
-        self.arm = arm
-        self.config = config
-        self._loaded = arm
-        self._nominal = arm.nominal()
         self._ik = InverseKinematics(arm)
-        self._records, self._index = checked_slot(arm, records, index)
-        self._bind()
-        fill_params(self.record["params"], config, arm)
+        self._loaded = arm
+        super().__init__(arm, config, records, index)
         self._last_numbers: list = []
-        self._is_reset = False
 
     def _bind(self) -> None:
-        self.record = self._records[self._index]
-        self._ticked = self._records.view(controller_dtype(self.arm.n))  # what was pickled has an equal type of its own
-        self._measured = _views(self._records["measurement"], self._index)
-        self._reported = _views(self._records["output"], self._index)
-        self._kept = _views(self._records["target"], self._index)["kept"]
-        self.record["handle"] = self._nominal.handle
+        super()._bind()
+        self._kept = views(self._records["target"], self._index)["kept"]
 
     def reset(
         self,
@@ -123,8 +104,7 @@ class Controller(Independent):
         held_by = np.clip(np.full(6, _HELD_STIFFNESS), *allowed)
         if stiffness is not None:
             held_by = checked_gain(stiffness, "stiffness", "1/s²", allowed)
-        for part in ("state", "output", "measurement"):
-            self.record[part] = np.zeros((), dtype=self.record[part].dtype)
+        self.forget()
         self.record["dynamics"] = dynamics
         state = self.record["state"]
         state["command"]["tau"], state["clock"]["q_good"] = tau, q
@@ -228,16 +208,11 @@ class Controller(Independent):
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
             UnreachableError: no posture was given and none was found for the pose.
         """
-        if not isinstance(measurement, Measurement):
-            raise InvalidInputError(f"measurement is {type(measurement).__name__}; give a contactsafe.Measurement")
-        if not self._is_reset:
-            raise InvalidInputError(
-                "the controller was not reset; call reset(q) with the measured joint positions first"
-            )
+        self.require_reset(measurement)
         self._kept[...] = target is None
         if target is not None:
             self.set_target(target)
-        self._set_measurement(measurement)
+        self.set_measurement(measurement)
         tick_at(self._ticked, self._index)
         return output_of(self._reported)
 
@@ -263,24 +238,6 @@ class Controller(Independent):
         record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers
-
-    def _set_measurement(self, measurement: Measurement) -> None:
-        seen = self._measured
-        seen["q"][:] = shaped(measurement.q, self.arm.n, "q")
-        seen["qd"][:] = shaped(measurement.qd, self.arm.n, "qd")
-        seen["has_wrench"][...] = measurement.wrench_ee is not None
-        if measurement.wrench_ee is not None:
-            seen["wrench_ee"][:] = shaped(measurement.wrench_ee, 6, "wrench_ee")
-        seen["has_time"][...] = measurement.time is not None
-        if measurement.time is not None:
-            seen["time"][...] = seconds(measurement.time)
-
-
-def _views(records: np.ndarray, index: int) -> dict[str, np.ndarray]:
-    """Return each field of one record as an array on its memory: reading and writing it is quick."""
-    return {
-        name: records[name][index : index + 1].reshape(records.dtype[name].shape) for name in records.dtype.names or ()
-    }
 
 
 _WARM: set[int] = set()

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.control.noise import noise_left
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.friction import joint_friction_into
@@ -10,8 +11,11 @@ from contactsafe.robot.friction import joint_friction_into
 _f = np.float64
 _i = np.int64
 
-_SIGMAS = 3.0
+GRAVITY_SIGMAS = 3.0
 """Standard deviations of the unidentified weight that a threshold allows for."""
+
+_NOISE_SIGMAS = 6.0
+"""Standard deviations of noise beyond what is allowed that a threshold allows for."""
 
 
 def detection_dtype(n: int) -> np.dtype:
@@ -32,33 +36,35 @@ def set_thresholds(
     detection: Record,
     observer: Record,
     gravity_sigma: Vector,
-    qd: Vector,
+    arm: Record,
     CT_qd: Vector,
     params: Record,
-    friction_coefficients: Matrix,
 ) -> None:
     """Set each joint's threshold: δ plus what may be wrong with the model of the arm.
 
-    Added are fractions of the friction and of the inertial torque; how far a command may have changed since the motors
-    took it over; the change of the tool's wrench since it was measured last; and a multiple of the standard deviation
-    of the gravity torque that is not identified yet.
+    Added are fractions of the friction, unless it lies before a sensor of torque, and of the inertial torque; how far a
+    command may have changed since the motors took it over; the change of the tool's wrench since it was measured last;
+    a multiple of the standard deviation of the gravity torque that is not identified yet, and of noise that no filter
+    keeps down.
 
     Args:
         detection: `detection_dtype` record; its thresholds are set.
         observer: `observer_dtype` record.
         gravity_sigma: standard deviation of the gravity torque, (n,), N m.
-        qd: (n,), rad/s.
+        arm: of the state.
         CT_qd: Cᵀ q̇, (n,), N m.
-        params: of detection.
-        friction_coefficients: of the arm, (n, 3).
+        params: `params_dtype` record.
     """
-    friction = joint_friction_into(friction_coefficients, qd, stack_vector(qd.shape[0]))
-    for i in range(qd.shape[0]):
+    known, allowed_nm = params.detection, params.observer.residual_noise_nm
+    friction = joint_friction_into(params.arm.friction, arm.qd, stack_vector(CT_qd.shape[0]))
+    before_sensor = 0.0 if arm.has_torque != 0 else known.friction_uncertainty
+    for i in range(CT_qd.shape[0]):
         inertial = abs(observer.momentum_rate[i]) + abs(CT_qd[i])
-        uncertainty = params.friction_uncertainty * abs(friction[i]) + params.inertia_uncertainty * inertial
-        uncertainty += params.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
+        uncertainty = before_sensor * abs(friction[i]) + known.inertia_uncertainty * inertial
+        uncertainty += known.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
         detection.model_uncertainty[i] = uncertainty
-        detection.threshold[i] = params.residual_threshold + uncertainty + _SIGMAS * gravity_sigma[i]
+        detection.threshold[i] = known.residual_threshold + uncertainty + GRAVITY_SIGMAS * gravity_sigma[i]
+        detection.threshold[i] += _NOISE_SIGMAS * noise_left(observer.noise, i, allowed_nm)
 
 
 @inlined

@@ -1,15 +1,25 @@
-"""Observer: residuals, what acts on the arm from outside as torque at its joints, from momentum alone; (10)-(14)."""
+"""Observer: residuals, what acts on the arm from outside as torque at its joints, from momentum alone; (10)-(14).
+
+What drives the arm is its command less friction, and its momentum has the rotors' in it. Where the torque behind the
+gears is measured, that drives the links alone: friction and rotors lie before the sensor and are out of the model.
+"""
 
 import numpy as np
 
 from contactsafe.control.laws import momentum_into, observer_step
+from contactsafe.control.noise import follow_noise, noise_dtype, start_noise
 from contactsafe.control.plausibility import BRIDGE_TICKS
+from contactsafe.control.velocity import is_of_middle, start_velocity, velocity_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
 
 _f = np.float64
+_i = np.int64
+
+_UNKNOWN = -1
+"""Neither with the rotors nor without: no momentum is compared with the next."""
 
 _GAP = 0.3
 """Fraction of the time between two measurements in which the tool's wrench was not measured that counts as a gap."""
@@ -27,11 +37,16 @@ def observer_dtype(n: int) -> np.dtype:
             ("momentum_rate_unfiltered", _f, (n,)),
             ("torque_ramp", _f, (n,)),  # change of the command per tick behind the same filters, N m
             ("torque_ramp_unfiltered", _f, (n,)),
+            ("velocity", velocity_dtype(n)),
+            ("noise", noise_dtype(n)),
             ("momentum", _f, (n,)),  # at the last good measurement, kg m²/s
             ("beta", _f, (n,)),  # g − Cᵀ q̇ at the last tick, N m
             ("impulse", _f, (n,)),  # of the command less friction and β since the last good measurement, N m ticks
             ("impulse_ticks", _f),  # in so many ticks
+            ("impulse_before", _f, (n,)),  # the same between the two measurements before, N m ticks
             ("tau_before", _f, (n,)),  # command at the last good measurement, N m
+            ("torque_before", _f, (n,)),  # measured at the joints then, N m
+            ("behind_gears", _i),  # whether it was, −1 at first
             ("wrench_before", _f, (6,)),  # on the tool then, N and N m
             ("tool_torque_recent", _f, (n,)),  # largest torque of the tool's wrench of late, N m
             ("tool_torque_unseen", _f, (n,)),  # that a gap in the measurements may have hidden, N m
@@ -40,22 +55,59 @@ def observer_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def start_observer(observer: Record, command: Record, dynamics: Record, qd: Vector) -> None:
+def start_observer(observer: Record, command: Record, dynamics: Record, arm: Record, params: Record) -> None:
     """Begin with the momentum of now, and a raw external torque of zero.
 
     What the torque last sent did is not known: all of it that the arm did not need is put down to friction this once.
     """
-    momentum_into(dynamics.M, qd, observer.momentum)
-    for i in range(qd.shape[0]):
+    start_velocity(observer.velocity, arm.q, arm.qd)
+    start_noise(observer.noise, params.observer.residual_noise_nm)
+    _momentum_into(observer, dynamics.M, arm, params.arm.rotor, observer.momentum)
+    if arm.has_torque != 0:
+        observer.behind_gears = _UNKNOWN  # what it drives first shows with the next measurement
+    for i in range(arm.q.shape[0]):
         observer.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         command.friction[i] = command.tau[i] - observer.beta[i]
         observer.tau_before[i] = command.tau[i]
 
 
+@compiled
+def _momentum_into(observer: Record, M: Matrix, arm: Record, rotor: Vector, out: Vector) -> Vector:
+    """Fill the momentum of the links, and of the rotors where no torque is measured behind them, (n,), kg m²/s."""
+    qd = observer.velocity.qd
+    momentum_into(M, qd, out)
+    observer.behind_gears = arm.has_torque
+    if arm.has_torque != 0:
+        observer.torque_before[:] = arm.torque
+        for i in range(rotor.shape[0]):
+            out[i] -= rotor[i] * qd[i]
+    return out
+
+
+@compiled
+def rebase_momentum(observer: Record, M: Matrix, arm: Record, rotor: Vector, qd: Vector) -> None:
+    """Take the momentum last seen for that of another inertia, at the velocity that it was seen with.
+
+    Args:
+        observer: `observer_dtype` record.
+        M: joint inertia, (n, n), kg m².
+        arm: of the state.
+        rotor: inertia of the rotors, (n,), kg m².
+        qd: the robot's own velocity then, (n,), rad/s.
+    """
+    momentum_into(M, qd, observer.momentum)
+    if observer.velocity.of_positions != 0:
+        momentum_into(M, observer.velocity.qd, observer.momentum)
+    if arm.has_torque != 0:
+        for i in range(rotor.shape[0]):
+            observer.momentum[i] -= rotor[i] * observer.velocity.qd[i]
+
+
 @inlined
 def observe(
-    observer: Record, arm: Record, clock: Record, step: Record, command: Record, dynamics: Record, params: Record
-) -> None:
+    observer: Record, arm: Record, clock: Record, step: Record, command: Record, dynamics: Record, params: Record,
+    untouched: bool,
+) -> None:  # fmt: skip
     """Raw external torque since the last good measurement, two observers of it, a low-pass behind each.
 
     It is a mean over the time that passed, in which what was commanded is known tick by tick.
@@ -65,26 +117,36 @@ def observe(
         arm, clock, step, command: of the state.
         dynamics: of now.
         params: `params_dtype` record.
+        untouched: whether nothing touches the arm, as far as is known.
     """
     n = arm.q.shape[0]
-    _add_impulse(observer, clock.elapsed, command, dynamics)
+    _add_impulse(observer, arm, clock.elapsed, command, dynamics)
     if clock.bridged > 0:
         return
-    p = momentum_into(dynamics.M, arm.qd, stack_vector(n))
+    velocity = observer.velocity
+    # or the momentum of the rotors, or the difference of two velocities, would come or go at once
+    same = observer.behind_gears == arm.has_torque and velocity.changed == 0
+    p = _momentum_into(observer, dynamics.M, arm, params.arm.rotor, stack_vector(n))
     tau_external, rate, ramp, tau_tool = stack_vector(n), stack_vector(n), stack_vector(n), stack_vector(n)
     for i in range(n):
-        ramp[i] = (command.tau[i] - observer.tau_before[i]) / clock.since
-        rate[i] = (p[i] - observer.momentum[i]) / (clock.since * params.clock.dt)
-        tau_external[i] = rate[i] - observer.impulse[i] / observer.impulse_ticks
+        ramp[i] = 0.0 if arm.has_torque != 0 else (command.tau[i] - observer.tau_before[i]) / clock.since
+        impulse, ticks, between = observer.impulse[i], observer.impulse_ticks, clock.since
+        if is_of_middle(velocity, i):  # and so is the impulse between two of them
+            impulse, ticks = 0.5 * (impulse + observer.impulse_before[i]), velocity.between
+            between = velocity.between
+        rate[i] = (p[i] - observer.momentum[i]) / (between * params.clock.dt)
+        tau_external[i] = rate[i] - impulse / ticks
+        observer.impulse_before[i] = observer.impulse[i]
         observer.tau_before[i], observer.momentum[i], observer.impulse[i] = command.tau[i], p[i], 0.0
     observer.impulse_ticks = 0.0
     tau_tool[:] = 0.0
     if arm.has_wrench != 0 and params.observer.cancel_tool_wrench != 0:
         _tool_torque_into(observer, arm.wrench_ee, dynamics.J, clock.since, step, tau_tool)
-    if clock.since > BRIDGE_TICKS + 1.5 or clock.unclear != 0:
+    if clock.since > BRIDGE_TICKS + 1.5 or clock.unclear != 0 or not same:
         return
     for i in range(n):
         tau_external[i] -= tau_tool[i]
+    follow_noise(observer.noise, tau_external, step, untouched, params.observer.residual_noise_nm)
     observer_step(observer.residual_unfiltered, step.compensation_filter_gain, tau_external)
     observer_step(observer.residual_fast_unfiltered, step.detection_filter_gain, tau_external)
     observer_step(observer.momentum_rate_unfiltered, step.detection_filter_gain, rate)
@@ -96,13 +158,19 @@ def observe(
 
 
 @inlined
-def _add_impulse(observer: Record, elapsed: float, command: Record, dynamics: Record) -> None:
-    """Add what the command did in the ticks that passed, less friction and β, the mean of then and now."""
+def _add_impulse(observer: Record, arm: Record, elapsed: float, command: Record, dynamics: Record) -> None:
+    """Add what drove the arm in the ticks that passed, less β, the mean of then and now.
+
+    That is the command less friction, or the mean of the torques measured then and now.
+    """
     observer.impulse_ticks += elapsed
+    measured = arm.has_torque != 0 and observer.behind_gears != 0
     for i in range(observer.beta.shape[0]):
         beta = dynamics.g[i] - dynamics.CT_qd[i]
-        applied = command.tau[i] - command.friction[i] - 0.5 * (beta + observer.beta[i])
-        observer.impulse[i] += elapsed * applied
+        driving = command.tau[i] - command.friction[i]
+        if measured:
+            driving = 0.5 * (arm.torque[i] + observer.torque_before[i])
+        observer.impulse[i] += elapsed * (driving - 0.5 * (beta + observer.beta[i]))
         observer.beta[i] = beta
 
 

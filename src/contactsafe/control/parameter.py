@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, shown
 
 _f = np.float64
 _i = np.int64
@@ -26,6 +26,7 @@ class Parameter:
         fraction: whether more than 1 is refused as well.
         infinite: whether inf is allowed, which stands for "no bound" or "at once".
         per_joint: whether there is one number a joint, of which the last repeats or is dropped for other arms.
+        choices: words that it is one of, for what is no number; records have its place among them.
     """
 
     unit: str
@@ -34,9 +35,10 @@ class Parameter:
     fraction: bool = False
     infinite: bool = False
     per_joint: bool = False
+    choices: tuple[str, ...] = ()
 
 
-def parameter(default: Any, unit: str, doc: str, **bounds: bool) -> Any:
+def parameter(default: Any, unit: str, doc: str, **bounds: Any) -> Any:
     """Declare a field of a `Stage`; see `Parameter`. Numbers are never negative."""
     return field(default=default, metadata={"parameter": Parameter(unit, doc, **bounds)})
 
@@ -57,9 +59,19 @@ class Stage:
     def __post_init__(self) -> None:
         """Refuse what no controller can mean."""
         for declared in fields(self):
+            if declaration(declared).choices:
+                _check_choice(declared, getattr(self, declared.name))
+        numbers = [declared for declared in fields(self) if not declaration(declared).choices]
+        for declared in numbers:
             _check_numbers(declared, getattr(self, declared.name))
-        for declared in fields(self):
+        for declared in numbers:
             _check_bounds(declared, getattr(self, declared.name))
+
+
+def _check_choice(declared: Field, value: Any) -> None:
+    choices = declaration(declared).choices
+    if not isinstance(value, str) or value not in choices:
+        raise InvalidInputError(f"{declared.name} = {shown(value)} is no choice; give one of {', '.join(choices)}")
 
 
 def _check_numbers(declared: Field, value: Any) -> None:
@@ -85,6 +97,8 @@ def _check_numbers(declared: Field, value: Any) -> None:
 def allowed(declared: Field) -> str:
     """Return in words which values a parameter may have, as the documentation lists them."""
     known = declaration(declared)
+    if known.choices:
+        return ", ".join(known.choices)
     if isinstance(declared.default, bool):
         return "yes, no"
     if known.fraction:
@@ -96,11 +110,14 @@ def allowed(declared: Field) -> str:
 
 
 def from_text(declared: Field, text: str) -> Any:
-    """Return the value of a parameter as written on a command line: yes or no, a number, or numbers with / between.
+    """Return the value of a parameter as written on a command line: a choice, yes or no, a number, numbers with /.
 
     Raises:
         InvalidInputError: it is none of these.
     """
+    if declaration(declared).choices:
+        _check_choice(declared, text)
+        return text
     if isinstance(declared.default, bool):
         if text not in ("yes", "no"):
             raise InvalidInputError(f"{declared.name} = {text!r} is a switch; give yes or no")
@@ -133,7 +150,7 @@ def record_fields(stage: type[Stage], n: int) -> list[tuple]:
 
 
 def _record_field(declared: Field, n: int) -> tuple:
-    if isinstance(declared.default, bool):
+    if isinstance(declared.default, bool) or declaration(declared).choices:
         return declared.name, _i
     if declaration(declared).per_joint:
         return declared.name, _f, (n,)
@@ -144,6 +161,8 @@ def fill_record(record: Any, stage: Stage) -> None:
     """Write the parameters of a stage into a record of `record_fields`."""
     for declared in fields(stage):
         value = getattr(stage, declared.name)
+        if declaration(declared).choices:
+            value = declaration(declared).choices.index(value)
         if declaration(declared).per_joint:
             value = [value[min(i, len(value) - 1)] for i in range(len(record[declared.name]))]
         record[declared.name] = value

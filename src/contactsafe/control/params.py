@@ -34,6 +34,8 @@ step_dtype = np.dtype(
         ("detection_filter_gain", _f),
         ("compensation_filter_gain", _f),
         ("lowpass_gain", _f),
+        ("full_filter_gain", _f),  # of detection, whatever bandwidth is in force
+        ("full_lowpass_gain", _f),
         ("recover_gain", _f),
         ("reject_recover_gain", _f),
         ("probe_gain", _f),
@@ -59,7 +61,7 @@ def arm_dtype(n: int) -> np.dtype:
     return np.dtype(
         [(name, _f, (n,)) for name in ("q_min", "q_max", "qd_max", "tau_max", "runaway_speed", "reversal_s")]
         + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
-        + [("friction", _f, (n, 3)), ("lever_doubted", _f)]  # the latter in m
+        + [("friction", _f, (n, 3)), ("rotor", _f, (n,)), ("lever_doubted", _f)]  # kg m², m
     )
 
 
@@ -107,6 +109,7 @@ def _fill_one_tick(step: np.void, config: ControllerConfig, arm: Arm) -> None:
     step["detection_filter_gain"] = filter_gain(observer.detection_gain, dt)
     step["compensation_filter_gain"] = filter_gain(observer.compensation_gain, dt)
     step["lowpass_gain"] = filter_gain(2.0 * math.pi * observer.residual_cutoff_hz, dt)
+    step["full_filter_gain"], step["full_lowpass_gain"] = step["detection_filter_gain"], step["lowpass_gain"]
     step["recover_gain"] = fraction_per_tick(reaction.recover_s, dt)
     step["reject_recover_gain"] = fraction_per_tick(reaction.reject_recover_s, dt)
     step["probe_gain"] = fraction_per_tick(config.classification.probe_s, dt)
@@ -123,6 +126,7 @@ def _fill_arm(limits: np.void, config: ControllerConfig, arm: Arm) -> None:
     # From full drive to full braking of all that may drive a joint, and the lag of what is measured.
     limits["reversal_s"] = 2.0 * arm.tau_max.max() / arm.torque_rate_max + 10.0 * config.clock.loop_delay_s
     limits["tau_max"], limits["friction"], limits["lever_doubted"] = arm.tau_max, arm.friction, arm.lever_doubted
+    limits["rotor"] = arm.model.dof_armature
     limits["q_least"] = np.maximum(arm.q_min, -_TURNS_RAD) - OUTSIDE_RAD
     limits["q_most"] = np.minimum(arm.q_max, _TURNS_RAD) + OUTSIDE_RAD
     limits["qd_most"] = np.minimum(_FASTER * arm.qd_max, _speed_gained(arm))

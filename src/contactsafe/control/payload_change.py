@@ -4,11 +4,12 @@ import numpy as np
 
 from contactsafe.control.codes import FREE, LOAD
 from contactsafe.control.link_masses import reset_link_masses
+from contactsafe.control.observer import rebase_momentum
 from contactsafe.control.payload import payload_momentum_into, payload_weight_into, reset_payload
 from contactsafe.control.supervision import switch
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
-from contactsafe.core.linalg import dot, matvec_into
+from contactsafe.core.linalg import dot
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
 
@@ -31,7 +32,7 @@ def take_up(controllers: np.ndarray, index: int, weight: Vector) -> None:
         change[i] = dynamics.g[i] - change[i]
         observer.beta[i] = dynamics.g[i] - dynamics.CT_qd[i]
         observer.impulse[i] -= observer.impulse_ticks * change[i]
-    matvec_into(dynamics.M, state.clock.qd_good, observer.momentum)
+    rebase_momentum(observer, dynamics.M, state.arm, c.params.arm.rotor, state.clock.qd_good)
     payload_momentum_into(c.payload, dynamics, state.payload.momentum)
     shown = _shown(observer.residual, change)
     _move(observer.residual, shown, change)

@@ -12,6 +12,9 @@ from contactsafe.core.compiled import compiled
 BRIDGE_TICKS = 20
 """Ticks in a row that are bridged at most; after more of them the arm is braked until it is reset."""
 
+_MOST_TORQUE = 10.0
+"""Multiple of a joint's torque limit beyond which no sensor of it is believed."""
+
 OVERDUE_TICKS = BRIDGE_TICKS + 1.5
 
 SLACK_RAD = 1.5e-4
@@ -22,6 +25,9 @@ UNTRUE_RAD = 1e-3
 
 _JUMP_NM = 10.0
 """A change of velocity that takes more than this a tick must show in the positions as well."""
+
+_NOISE_RAD_S = 0.03
+"""By so much a real robot's velocity may jump by noise alone: five times the 4 to 6 mrad/s of a Panda's."""
 
 _AT_REST_RAD_S = 1e-6
 """Only a simulator stands as still as this; what it says twice is true twice."""
@@ -34,7 +40,7 @@ _STUCK_RAD = 2e-5
 def is_usable(m: Record, arm: Record, braking: int) -> bool:
     """Tell whether every number of a measurement is one that this arm can have.
 
-    A broken force sensor stops the arm, but it is braked by its joints, which are still seen.
+    A broken sensor of force or torque stops the arm, but it is braked by its joints, which are still seen.
 
     Args:
         m: `measurement_dtype` record.
@@ -46,7 +52,14 @@ def is_usable(m: Record, arm: Record, braking: int) -> bool:
             return False
     if m.has_time != 0 and not math.isfinite(m.time):
         return False
-    return m.has_wrench == 0 or braking != 0 or all_usable(m.wrench_ee)
+    if braking != 0:
+        return True
+    if m.has_wrench != 0 and not all_usable(m.wrench_ee):
+        return False
+    for i in range(m.torque.shape[0]):
+        if m.has_torque != 0 and not abs(m.torque[i]) < _MOST_TORQUE * arm.tau_max[i]:  # NaN as well
+            return False
+    return True
 
 
 @compiled
@@ -101,7 +114,7 @@ def velocity_jumps(clock: Record, m: Record, M: Matrix, time: float, dt: float) 
     """Tell whether a joint's velocity changed as nothing but a large torque changes it, and its position denies it."""
     for i in range(m.q.shape[0]):
         jump = m.qd[i] - clock.qd_good[i]
-        if abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
+        if abs(jump) > _NOISE_RAD_S and abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
             shown = (m.q[i] - clock.q_good[i]) / time - clock.qd_good[i]
             if shown * jump < 0.25 * jump * jump:
                 return True

@@ -8,6 +8,7 @@ import functools
 
 import numpy as np
 
+from contactsafe.control.baseline import baseline_dtype
 from contactsafe.control.classification import classification_dtype
 from contactsafe.control.clock import clock_dtype
 from contactsafe.control.codes import FREE, NO_CONTACT, REJECT, TOOL
@@ -16,11 +17,13 @@ from contactsafe.control.impedance import impedance_dtype
 from contactsafe.control.isolation import isolation_dtype
 from contactsafe.control.limits import limits_dtype
 from contactsafe.control.link_masses import link_masses_dtype
+from contactsafe.control.localisation import localisation_dtype
 from contactsafe.control.observer import observer_dtype
 from contactsafe.control.params import params_dtype, step_dtype
 from contactsafe.control.payload import known_payload_dtype, payload_dtype
 from contactsafe.control.reaction import reaction_dtype
 from contactsafe.control.tool_wrench import tool_wrench_dtype
+from contactsafe.control.touch import touch_dtype
 from contactsafe.robot.dynamics import dynamics_dtype, handle_dtype
 
 _f = np.float64
@@ -37,6 +40,8 @@ def measurement_dtype(n: int) -> np.dtype:
             ("has_wrench", _i),  # 0 where no force sensor is there
             ("time", _f),  # when it was measured, s
             ("has_time", _i),  # 0 where that is not known
+            ("torque", _f, (n,)),  # at the joints, behind the gears, N m
+            ("has_torque", _i),  # 0 where no sensor says it
         ]
     )
 
@@ -63,6 +68,8 @@ def arm_state_dtype(n: int) -> np.dtype:
             ("qd", _f, (n,)),  # rad/s
             ("wrench_ee", _f, (6,)),  # last good one
             ("has_wrench", _i),
+            ("torque", _f, (n,)),  # last good one, N m
+            ("has_torque", _i),
         ]
     )
 
@@ -94,6 +101,9 @@ def state_dtype(n: int) -> np.dtype:
             ("detection", detection_dtype(n)),
             ("isolation", isolation_dtype(n)),
             ("tool_wrench", tool_wrench_dtype(n)),
+            ("baseline", baseline_dtype(n)),
+            ("touch", touch_dtype),
+            ("localisation", localisation_dtype(n)),
             ("link_masses", link_masses_dtype(n)),
             ("payload", payload_dtype),
             ("classification", classification_dtype(n)),
@@ -118,6 +128,10 @@ def output_dtype(n: int) -> np.dtype:
             ("mode", _i),  # FREE, COMPLY or REJECT
             ("kind", _i),  # key of KINDS
             ("link", _i),  # 1 … n, 0 for none
+            ("probability", _f),  # of the kind
+            *(
+                (name, _f, (3,)) for name in ("point", "force")
+            ),  # where, m, NaN where unknown, and what is there, N; world
             ("contact_command_nm", _f),  # commanded torque against the contact before it is bounded, N m
             ("contact_limit_nm", _f),  # the bound in force; inf where there is none
             ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command
@@ -149,13 +163,17 @@ def controller_dtype(n: int) -> np.dtype:
 
 def index_bounds(controller: np.void) -> dict[str, tuple[float, float]]:
     """Return by name what those integers of a `controller_dtype` record may be that compiled code indexes with."""
-    n, points = len(controller["output"]["torque"]), int(controller["handle"]["surface_points"])
+    n, handle = len(controller["output"]["torque"]), controller["handle"]
+    points, places = int(handle["surface_points"]), int(handle["place_points"])
     return {
         "state.turn": (0, n - 1),
         "state.mode": (FREE, REJECT),
         "state.isolation.link": (0, n),
         "state.isolation.search_at": (0, max(points - 1, 0)),
         "state.isolation.search_point": (-1, points - 1),
+        "state.localisation.next": (0, max(places - 1, 0)),
+        "state.localisation.best": (-1, places - 1),
+        "state.localisation.link": (0, n + 1),
         "output.mode": (FREE, REJECT),
         "output.kind": (NO_CONTACT, TOOL),
         "output.link": (0, n),

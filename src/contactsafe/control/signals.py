@@ -1,5 +1,6 @@
 """What goes into a step of the controller, and what comes out."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +19,15 @@ class Measurement(NamedTuple):
             None without a force sensor.
         time: when it was measured, s, by any clock that only goes forward; None where it is not known: then a tick
             counts as one tick of time, unless the joints went further than that.
+        torque: joint torque measured behind the gears, where the links begin, gravity included, (n,), N m: Franka's
+            `tau_J`. None without such sensors: then the command stands for it, less friction and what the rotors take.
     """
 
     q: np.ndarray
     qd: np.ndarray
     wrench_ee: np.ndarray | None = None
     time: float | None = None
+    torque: np.ndarray | None = None
 
 
 class Target(NamedTuple):
@@ -44,22 +48,36 @@ class Target(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """What is known of a contact on the arm.
+    """What is known of what touches the arm, or its tool.
 
     Attributes:
-        in_contact: whether the contact-aware law is in force.
-        link: found in contact on the arm's surface, or without one the furthest whose joint residual exceeds the
-            threshold, 1 … n; 0 for none.
+        in_contact: whether the contact-aware law is in force: for contacts of the arm.
+        link: that is touched, most probably, 1 … n; the tool is part of the last one. 0 for none.
         kind: 'obstacle', with which the arm complies, or 'push', which it rejects: one on the arm counts as an
             obstacle until receding from it has shown that it pushes; 'tool' where the tool alone touches something;
             'none'.
         torque: estimated joint torque of the contact, (n,), N m (the fast residual).
+        probability: of the kind's being right as to arm or tool; like point and force by `ContactEstimator` alone, NaN
+            by the controller.
+        point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints.
+            `ContactEstimator.places()` gives the others that explain the torques.
+        force: of the environment there, as far as joint torques tell it, world, (3,), N.
+        bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
     """
 
     in_contact: bool
     link: int
     kind: str
     torque: np.ndarray
+    probability: float
+    point: np.ndarray
+    force: np.ndarray
+    bridged: int = 0
+
+    @property
+    def touched(self) -> bool:
+        """Whether anything touches arm or tool now; a law may stay in force for a while after it (`in_contact`)."""
+        return self.kind != "none"
 
 
 class Output(NamedTuple):
@@ -94,17 +112,30 @@ class Output(NamedTuple):
 _LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum_ in range(2 * max(LIMITS))]
 
 
-def output_of(out: dict[str, np.ndarray]) -> Output:
-    """Return what a tick reports, from the fields of an `output_dtype` record."""
-    contact = Contact(
+def contact_of(out: dict[str, np.ndarray], placed: bool) -> Contact:
+    """Return what a tick reports of a contact, from the fields of an `output_dtype` record.
+
+    Args:
+        out: the fields.
+        placed: whether the contact's place was looked for, as the estimator does and the controller does not.
+    """
+    return Contact(
         in_contact=bool(out["mode"] != FREE),
         link=int(out["link"]),
         kind=KINDS[int(out["kind"])],
         torque=out["residual_fast"].copy(),
+        probability=float(out["probability"]) if placed else math.nan,
+        point=out["point"].copy() if placed else np.full(3, np.nan),
+        force=out["force"].copy() if placed else np.full(3, np.nan),
+        bridged=int(out["bridged"]),
     )
+
+
+def output_of(out: dict[str, np.ndarray]) -> Output:
+    """Return what a tick reports, from the fields of an `output_dtype` record."""
     return Output(
         torque=out["torque"].copy(),
-        contact=contact,
+        contact=contact_of(out, placed=False),
         residual=out["residual"].copy(),
         error=out["error"].copy(),
         limited_by=_LIMITED_BY[int(out["limited_by"])],

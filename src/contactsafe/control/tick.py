@@ -8,19 +8,16 @@ import math
 import numpy as np
 
 from contactsafe.control import contact_bound, reaction
-from contactsafe.control.classification import contact_kind
-from contactsafe.control.clock import receive, set_step
+from contactsafe.control.clock import set_step
 from contactsafe.control.codes import (
     BAD_MEASUREMENT,
     COMPLY,
     FREE,
     LIMITED_BY_LOAD,
-    LOAD,
     MISSING,
     NO_TORQUE,
-    RUNAWAY,
 )
-from contactsafe.control.detection import set_thresholds
+from contactsafe.control.estimation import estimate, follow_arm, latch, report_arm, start_estimation
 from contactsafe.control.impedance import (
     compose_into,
     follow_gains,
@@ -29,27 +26,15 @@ from contactsafe.control.impedance import (
     task_wrenches,
 )
 from contactsafe.control.laws import contact_nullspace, task_error, task_inertia, task_nullspace, torque_against_contact
-from contactsafe.control.limits import fill_tank, limit_command, limit_torque, runs_away
-from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
-from contactsafe.control.observer import observe, start_observer
-from contactsafe.control.payload import (
-    identify_payload,
-    is_settled,
-    load_regressor_into,
-    load_sags,
-    reset_payload,
-    take_off_payload,
-)
+from contactsafe.control.limits import fill_tank, limit_command, limit_torque
 from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.stopping import stop_late_target, stop_torque
-from contactsafe.control.supervision import supervise
 from contactsafe.control.target import accept_target
-from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
+from contactsafe.control.tool_wrench import follow_tool_force
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import dot, matmul
+from contactsafe.core.linalg import matmul
 from contactsafe.core.stack import stack_vector
-from contactsafe.robot.dynamics import update_dynamics
 
 
 @compiled(nogil=True)
@@ -65,21 +50,15 @@ def control_tick(c: Record) -> None:
         if state.started == 0:
             _wait(c)
             return
-    receive(c, usable)
+    follow_arm(c, usable)
     latch(state, accept_target(state.target, c.target, c.params.impedance))
-    update_dynamics(c.handle, state.arm.q, state.arm.qd, dynamics)
-    if c.payload.in_wrench != 0 and state.clock.bridged == 0:
-        seconds = max(state.clock.since, 1.0) * c.params.clock.dt
-        take_off_payload(state.payload, state.arm, c.payload, dynamics, c.handle.gravity, seconds, state.started)
-    mass_variance = c.params.identification.mass_variance
-    correct_gravity(state.link_masses, dynamics, c.handle, state.arm.has_wrench, mass_variance)
     if state.started == 0:
         _start(c)
     stop_late_target(state.clock, state.target, c.target.kept, state.arm, dynamics, c.params.clock)
     known = c.params.impedance
     Lambda, J_M_inv = task_inertia(dynamics.J, dynamics.M_inv, known.manipulability_floor, known.manipulability_damping)
     J_bar = matmul(J_M_inv.T, Lambda)
-    _estimate(c, J_bar)
+    estimate(c, J_bar)
     set_step(state.step, c.params.one_tick, state.clock.elapsed)
     tau = _law(c, Lambda, J_bar)
     if state.clock.braking != 0:
@@ -91,13 +70,6 @@ def control_tick(c: Record) -> None:
 def tick_at(controllers: np.ndarray, i: int) -> None:
     """Run `control_tick` on one of an array of records: Python hands over an array far faster than a record."""
     control_tick(controllers[i])
-
-
-@compiled
-def latch(state: Record, fault: int) -> None:
-    """Keep the first fault since reset, 0 is none; what brakes the arm and LOAD are written over it."""
-    if state.fault == 0:
-        state.fault = fault
 
 
 @compiled
@@ -116,70 +88,13 @@ def _wait(c: Record) -> None:
 
 @compiled
 def _start(c: Record) -> None:
-    """Begin where the arm is: momentum as measured, command as last sent, masses as the model says."""
+    """Begin where the arm is, with the command as last sent."""
     state = c.state
-    state.started = 1
     state.reaction.task_scale, state.reaction.posture_scale = 1.0, 1.0
     state.limits.tank_j = c.params.limits.tank_j
     state.impedance.K_task[:] = state.target.K_task
     state.impedance.D_task[:] = state.target.D_task
-    start_link_masses(state.link_masses, c.dynamics.mass_regressor, c.params.identification.mass_variance)
-    start_observer(state.observer, state.command, c.dynamics, state.arm.qd)
-    reset_payload(state.payload)
-
-
-@inlined
-def _estimate(c: Record, J_bar: Matrix) -> None:
-    """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
-    state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
-    detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
-    set_step(state.step, params.one_tick, min(state.clock.since, BRIDGE_TICKS + 1.0))
-    observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params)
-    if state.clock.bridged > 0:
-        return
-    set_thresholds(
-        detection, observer, masses.gravity_sigma, state.arm.qd, dynamics.CT_qd, params.detection, params.arm.friction
-    )
-    if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
-        take_all_for_the_arm(tool, detection.residual, observer)
-    else:
-        memory_gain = state.step.tool_memory_gain if state.mode == FREE else 0.0
-        separate_tool_wrench(tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, params.identification)
-    supervise(c)
-    _identify(c)
-    if _has_unknown_load(c) and state.clock.braking == 0 and state.limits.runaway == 0:
-        state.fault = LOAD  # it takes the place of faults that are over
-    state.turn = (state.turn + 1) % state.arm.q.shape[0]
-    if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
-        state.fault, state.limits.runaway = RUNAWAY, 1
-    state.clock.since = 0.0
-
-
-@inlined
-def _identify(c: Record) -> None:
-    """Identify link masses from one joint's residual, while nothing touches the arm."""
-    state, params, observer, dynamics = c.state, c.params, c.state.observer, c.dynamics
-    i, untouched = state.turn, state.mode == FREE and state.detection.quiet_ticks > 0
-    identify_link_masses(
-        state.link_masses, i, observer.residual[i], state.detection.model_uncertainty[i], dynamics.mass_regressor[i],
-        state.step.dt, untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
-    )  # fmt: skip
-
-
-@inlined
-def _has_unknown_load(c: Record) -> bool:
-    """Identify the payload from one joint's torque, all that acts from outside; tell whether it keeps the tool away."""
-    state, dynamics, gravity, dt, i = c.state, c.dynamics, c.handle.gravity, c.state.step.dt, c.state.turn
-    payload, known_kg = state.payload, c.payload.mass
-    if not is_settled(payload, state.arm.qd, dt):
-        return False
-    torque = state.observer.residual[i] - state.link_masses.gravity_correction[i]
-    if state.arm.has_wrench != 0 and c.params.observer.cancel_tool_wrench != 0:
-        torque += dot(dynamics.J[:, i], state.arm.wrench_ee)
-    row = load_regressor_into(dynamics, gravity, i, stack_vector(4))
-    uncertainty, dry_friction = state.detection.model_uncertainty[i], c.params.arm.friction[i, 0]
-    identify_payload(payload, row, torque, uncertainty, dry_friction, dt, known_kg)
-    return load_sags(payload, c.output.error, dynamics.velocity, gravity, known_kg, dt)
+    start_estimation(c)
 
 
 @inlined
@@ -263,12 +178,6 @@ def _send(c: Record, tau: Vector) -> None:
     state.command.tau[:] = tau
     fill_tank(state.limits, state.command, dynamics.g, state.arm.qd, state.step.dt, c.params.limits)
     out.torque[:] = tau
-    out.residual[:] = state.observer.residual
-    out.residual_fast[:] = state.observer.residual_fast
-    out.position[:] = dynamics.position
-    out.rotation[:] = dynamics.rotation
-    out.velocity[:] = dynamics.velocity
-    out.mode, out.fault = state.mode, state.fault
-    out.kind = contact_kind(state.mode, state.tool_wrench.force, c.params.classification.tool_contact_n)
+    report_arm(c)
     out.target_late = state.clock.target_late
     out.braked = 1 if state.clock.braking != 0 or state.limits.runaway != 0 else 0

@@ -4,7 +4,7 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Sequence
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -38,9 +38,25 @@ class RunInfo(TypedDict, total=False):
     command: str
 
 
+class Words(NamedTuple):
+    """What a page says of itself where it is no comparison of controllers.
+
+    Attributes:
+        title, headline, introduction: at its top.
+        method: where its numbers come from.
+    """
+
+    title: str
+    headline: str
+    introduction: str
+    method: str
+
+
 def controllers(experiments: Iterable[Experiment]) -> list[str]:
-    """Return the names of all controllers measured: the known ones first, baseline leading, then the others."""
+    """Return the names of all controllers measured or recorded: the known ones first, baseline leading, then others."""
+    experiments = list(experiments)
     found = dict.fromkeys(name for e in experiments for rows in e.spreads().values() for name in rows)
+    found |= dict.fromkeys(recording.controller for e in experiments for recording in e.recordings)
     return [name for name in COLOURS if name in found] + [name for name in found if name not in COLOURS]
 
 

@@ -7,19 +7,25 @@ from string import Template
 from typing import Any
 
 from contactsafe.report import data
-from contactsafe.report.data import RunInfo
+from contactsafe.report.data import RunInfo, Words
 from contactsafe.report.output import prepare_output, write_whole
 from contactsafe.report.summary import trials_csv, write_summary
 from contactsafe.results.experiment import Experiment
 
 
-def write_report(folder: str | Path, experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> Path:
+def write_report(
+    folder: str | Path,
+    experiments: Sequence[Experiment],
+    info: RunInfo | Mapping[str, Any],
+    words: Words | None = None,
+) -> Path:
     """Write `summary.json`, every experiment's trials as CSV, and last, as drawing it may fail, `report.html`.
 
     Args:
         folder: where to.
         experiments: what was measured.
         info: of the run; see `RunInfo`.
+        words: what the page says of itself; None for a comparison of controllers.
 
     Returns:
         Path of the page.
@@ -31,15 +37,15 @@ def write_report(folder: str | Path, experiments: Sequence[Experiment], info: Ru
     write_summary(folder, experiments, info)
     for experiment in experiments:
         write_whole(folder / f"{experiment.name}.csv", trials_csv(experiment))
-    return write_whole(folder / "report.html", render(experiments, info))
+    return write_whole(folder / "report.html", render(experiments, info, words))
 
 
-def render(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any]) -> str:
+def render(experiments: Sequence[Experiment], info: RunInfo | Mapping[str, Any], words: Words | None = None) -> str:
     """Return the page as text."""
     from contactsafe.report import sections  # brings matplotlib, which the other commands need not wait for
 
     names = data.controllers(experiments)
-    parts = sections.parts(experiments, names, info)
+    parts = sections.parts(experiments, names, info, words)
     return Template(_file("page.html")).substitute(
         parts, style=_colours(names) + _file("style.css"), script=_file("film.js")
     )

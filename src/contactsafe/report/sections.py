@@ -7,7 +7,7 @@ from typing import Any
 import contactsafe
 from contactsafe.control import presets
 from contactsafe.report import data, html_tables, strip
-from contactsafe.report.data import RunInfo
+from contactsafe.report.data import RunInfo, Words
 from contactsafe.report.film import film_json
 from contactsafe.report.plots import Plotter, spans
 from contactsafe.report.summary import versions
@@ -18,7 +18,12 @@ from contactsafe.results.recording import Recording
 _COUNTS = {1: "one controller", 2: "two controllers", 3: "three controllers"}
 
 
-def parts(experiments: Sequence[Experiment], names: Sequence[str], info: RunInfo | Mapping[str, Any]) -> dict[str, str]:
+def parts(
+    experiments: Sequence[Experiment],
+    names: Sequence[str],
+    info: RunInfo | Mapping[str, Any],
+    words: Words | None = None,
+) -> dict[str, str]:
     """Return every piece of the page's template by name, as HTML."""
     plotter = Plotter(names)
     key = [
@@ -27,17 +32,27 @@ def parts(experiments: Sequence[Experiment], names: Sequence[str], info: RunInfo
     ]
     return {
         "version": escape(str(info.get("version", contactsafe.__version__))),
-        **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers")),
+        **_head(experiments, _COUNTS.get(len(names), f"{len(names)} controllers"), words),
         "key": "\n".join(key),
         "cards": html_tables.cards(experiments, names),
-        "results": html_tables.table(experiments, names, main_only=True) + html_tables.tally(experiments, names),
+        "results": _results(experiments, names),
         "sections": "\n".join(_section(experiment, names, plotter) for experiment in experiments),
-        "method": _method(experiments, names, info),
+        "method": _method(experiments, names, info, words),
     }
 
 
-def _head(experiments: Sequence[Experiment], count: str) -> dict[str, str]:
+def _results(experiments: Sequence[Experiment], names: Sequence[str]) -> str:
+    """Return the section of main figures; nothing where there was no trial."""
+    if not any(experiment.trials for experiment in experiments):
+        return ""
+    figures = html_tables.table(experiments, names, main_only=True) + html_tables.tally(experiments, names)
+    return f'<section id="results">\n<h2>Results</h2>\n{figures}\n</section>'
+
+
+def _head(experiments: Sequence[Experiment], count: str, words: Words | None) -> dict[str, str]:
     """Return title, headline and first sentences of the page: a policy is named only where one was run."""
+    if words is not None:
+        return {name: escape(getattr(words, name)) for name in ("title", "headline", "introduction")}
     policies = dict.fromkeys(experiment.policy for experiment in experiments if experiment.policy)
     if policies:
         what, headline = "one policy", f"One learned policy, {count}, and contacts nobody planned"
@@ -63,8 +78,8 @@ def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter) -> 
             _film(experiment),
             *(_figure(experiment, figure, plotter) for figure in experiment.figures),
             *(html_tables.plain(own) for own in experiment.tables),
-            f"<h3>All figures</h3>{html_tables.table([experiment], names)}",
-            html_tables.verdict(experiment, names),
+            f"<h3>All figures</h3>{html_tables.table([experiment], names)}" if experiment.trials else "",
+            html_tables.verdict(experiment, names) if experiment.trials else "",
             "</section>",
         ]
     )
@@ -96,7 +111,7 @@ def _figure(experiment: Experiment, figure: Figure, plotter: Plotter) -> str:
     if not any(plotted):
         return ""
     kind = "plots two" if figure.columns == 2 else "plots"
-    caption = f"<figcaption>{escape(figure.caption)} {_shown(shown, figure)}</figcaption>"
+    caption = f"<figcaption>{escape(figure.caption)} {_shown(shown, figure)}</figcaption>".replace(" </fig", "</fig")
     return f'<figure><div class="{kind}">{"".join(plotted)}</div>{caption}</figure>'
 
 
@@ -105,6 +120,8 @@ def _bands(runs: Sequence[Recording], figure: Figure) -> list[tuple[float, float
 
 
 def _shown(runs: Sequence[Recording], figure: Figure) -> str:
+    if figure.of_a_log:
+        return ""
     seeds = f"seed {', '.join(str(seed) for seed in sorted({run.seed for run in runs}))}"
     return (
         f"Under {escape(runs[-1].controller)}, {seeds}." if figure.one_controller else f"One run a controller: {seeds}."
@@ -115,10 +132,16 @@ def _titled(title: str, plotted: str) -> str:
     return f"<div><h4>{escape(title)}</h4>{plotted}</div>" if plotted else ""
 
 
-def _method(experiments: Sequence[Experiment], names: Sequence[str], info: Mapping[str, Any]) -> str:
-    runs = sum(len(experiment.as_dict()["trials"]) for experiment in experiments)
-    seeds = list(info.get("seeds", ()))
-    text = (
+def _method(
+    experiments: Sequence[Experiment], names: Sequence[str], info: Mapping[str, Any], words: Words | None
+) -> str:
+    text = _how_compared(experiments) if words is None else f"<p>{escape(words.method)}</p>"
+    found = {**({} if words else _runs(experiments, names, info)), **_made_by(info)}
+    return text + '<dl class="info">' + "".join(f"<dt>{k}</dt><dd>{v}</dd>" for k, v in found.items() if v) + "</dl>"
+
+
+def _how_compared(experiments: Sequence[Experiment]) -> str:
+    return (
         "<p>Contact forces and external torques are the simulator's own (MuJoCo at 1 kHz); no controller sees them. "
         "The residual is what a controller's momentum observer makes of its sensors. For one seed, all controllers get "
         f"the same scenes, obstacles, pushes and sensor noise. {_who_acts(experiments)}</p>"
@@ -131,22 +154,26 @@ def _method(experiments: Sequence[Experiment], names: Sequence[str], info: Mappi
         "differs in other respects too. The figures compare controllers under equal conditions. "
         "They are no certificate, and no proof that any contact with a person is harmless.</p>"
     )
-    found = {
+
+
+def _runs(experiments: Sequence[Experiment], names: Sequence[str], info: Mapping[str, Any]) -> dict[str, str]:
+    runs = sum(len(experiment.as_dict()["trials"]) for experiment in experiments)
+    return {
         "Runs": escape(f"{runs}: {', '.join(names)}") if names else str(runs),
-        "Seeds": _seeds(seeds),
-        "Command": f"<code>{escape(str(info['command']))}</code>" if info.get("command") else "",
-        "Policy bundle": f"<code>SHA-256 {escape(str(info['bundle_sha256']))}</code>"
-        if info.get("bundle_sha256")
-        else "",
-        "Made": escape(str(info.get("when", ""))),
-        "Versions": escape(
-            ", ".join(
-                [f"contactsafe {info.get('version', contactsafe.__version__)}"]
-                + [f"{name} {number}" for name, number in versions().items()]
-            )
-        ),
+        "Seeds": _seeds(list(info.get("seeds", ()))),
     }
-    return text + '<dl class="info">' + "".join(f"<dt>{k}</dt><dd>{v}</dd>" for k, v in found.items() if v) + "</dl>"
+
+
+def _made_by(info: Mapping[str, Any]) -> dict[str, str]:
+    packages = [f"contactsafe {info.get('version', contactsafe.__version__)}"]
+    packages += [f"{name} {number}" for name, number in versions().items()]
+    digest = escape(str(info.get("bundle_sha256", "")))
+    return {
+        "Command": f"<code>{escape(str(info['command']))}</code>" if info.get("command") else "",
+        "Policy bundle": f"<code>SHA-256 {digest}</code>" if digest else "",
+        "Made": escape(str(info.get("when", ""))),
+        "Versions": escape(", ".join(packages)),
+    }
 
 
 def _who_acts(experiments: Sequence[Experiment]) -> str:

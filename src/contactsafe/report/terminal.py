@@ -34,7 +34,8 @@ def terminal_table(experiments: Sequence[Experiment]) -> str:
             shared = _shared_aim([line for _, line in labelled])
             table.append([f"{experiment.title}: {heading}" + (f"; aim: {_ascii(shared)}" if shared else "")])
             table += [_row(label, line, names, aim=not shared) for label, line in labelled]
-    return "\n\n".join([_align(table), *(_plain(own) for experiment in experiments for own in experiment.tables)])
+    figures = [] if experiments and not any(experiment.trials for experiment in experiments) else [_align(table)]
+    return "\n\n".join(figures + [_plain(own) for experiment in experiments for own in experiment.tables])
 
 
 def _plain(table: Table) -> str:

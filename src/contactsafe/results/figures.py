@@ -43,6 +43,7 @@ class Figure:
         columns: of plots, 2 or 3.
         shaded: true while a plot's ground is to be shaded, one value a tick, (T,).
         one_controller: show the last controller alone.
+        of_a_log: what is plotted was recorded once, and has no seed.
     """
 
     plots: tuple[tuple[Panel, ...], ...]
@@ -50,6 +51,7 @@ class Figure:
     columns: int = 2
     shaded: Curve | None = None
     one_controller: bool = False
+    of_a_log: bool = False
 
 
 def component(field: str, index: int, scale: float = 1.0) -> Curve:

@@ -16,6 +16,7 @@ from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 from contactsafe.robot.surface import SURFACE_COLUMNS, capsule_surface
+from contactsafe.robot.touchable import capsule_places, touchable
 from contactsafe.robot.wrist import WristNames
 
 
@@ -40,14 +41,15 @@ class NominalModel(Independent):
 
     _bound = ("_data", "handle")
 
-    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray):
+    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray, places: np.ndarray):
         self._model = model
         self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
+        self._places = np.ascontiguousarray(places, dtype=float)
         self._bind()
 
     def _bind(self) -> None:
         self._data = mujoco.MjData(self._model)
-        self.handle = make_handle(self._model, self._data, self._site, self._surface)[0]
+        self.handle = make_handle(self._model, self._data, self._site, self._surface, self._places)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,8 @@ class Arm(Independent):
             nobody says.
         tool: what the flange carries; None likewise.
         surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
+        places: where something may touch the links or, last, the tool, (P, 7), see `contactsafe.robot.touchable`; by
+            default the surface and what the tool says. Where another tool or surface replaces them, give none.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
@@ -90,9 +94,12 @@ class Arm(Independent):
     tool: Tool | None = None
     surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
+    places: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
+        if len(self.places) == 0:
+            object.__setattr__(self, "places", touchable(self.surface, self.tool))
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
         refuse_unsound(self)
@@ -124,7 +131,7 @@ class Arm(Independent):
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site, self.surface)
+        return NominalModel(self.model, self.site, self.surface, self.places)
 
     def joint_vector(self, value: ArrayLike, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.
@@ -230,4 +237,5 @@ def arm_from_description(description: ArmDescription, tool: Tool) -> Arm:
         description=description,
         tool=tool,
         surface=capsule_surface(description),
+        places=touchable(capsule_places(description), tool),
     )

@@ -31,9 +31,11 @@ _VIEWED = (
 )  # fmt: skip
 
 handle_dtype = np.dtype(
-    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "surface")]
+    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "surface", "places")]
     + [
         ("surface_points", np.int64),
+        ("place_points", np.int64),  # of links and tool
+        ("tool_places", np.int64),  # the last of them, the tool's
         ("site", np.int64),
         ("first_body", np.int64),
         ("tool_body", np.int64),
@@ -65,16 +67,21 @@ def dynamics_dtype(n: int) -> np.dtype:
     )
 
 
-def make_handle(model: mujoco.MjModel, data: mujoco.MjData, site: str, surface: np.ndarray) -> np.ndarray:
+def make_handle(
+    model: mujoco.MjModel, data: mujoco.MjData, site: str, surface: np.ndarray, places: np.ndarray
+) -> np.ndarray:
     """Fill a handle for a model of one serial arm, array of one `handle_dtype` record.
 
-    The caller keeps `model`, `data` and `surface` (rows as in `contactsafe.robot.surface`) alive as long as the handle.
+    The caller keeps all that is given alive as long as the handle: of surface and places, rows as in
+    `contactsafe.robot.surface`, it has the addresses.
     """
     handle = np.zeros(1, dtype=handle_dtype)
     handle["model"], handle["data"] = model._address, data._address
     for name in _VIEWED:
         handle[name] = getattr(data, name).ctypes.data
     handle["surface"], handle["surface_points"] = surface.ctypes.data, len(surface)
+    handle["places"], handle["place_points"] = places.ctypes.data, len(places)
+    handle["tool_places"] = np.count_nonzero(places[:, 0] == 0.0)
     handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id

@@ -73,6 +73,9 @@ def franka_arm(
     )
 
 
+FLANGE = Tool(name="bare flange", inertia=Inertia(0.0, (0.0, 0.0, 0.0), (0.0,) * 6), tcp=(0.0, 0.0, 0.0), capsules=())
+"""Nothing: the tool point is the middle of the flange."""
+
 _HAND_CAPSULES = (Capsule((0.0, -0.06, 0.04), (0.0, 0.06, 0.04), 0.04),)
 _HAND_INERTIA = Inertia(0.73, (-0.01, 0.0, 0.03), (0.001, 0.0025, 0.0017, 0.0, 0.0, 0.0))
 

@@ -66,7 +66,8 @@ def arm_body(description: ArmDescription, tool: Tool) -> ET.Element:
     mount = ET.SubElement(
         parent, "body", name="tool", pos=numbers(description.mount_position), quat=numbers(description.mount_quat)
     )
-    _inertial(mount, tool.inertia)
+    if tool.inertia.mass > 0.0:
+        _inertial(mount, tool.inertia)
     _capsules(mount, "tool", tool.capsules)
     if tool.tip is not None:
         centre = (tool.tcp[0], tool.tcp[1], tool.tcp[2] - tool.tip.half_size[2])

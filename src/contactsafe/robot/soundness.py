@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.surface import SURFACE_COLUMNS
+from contactsafe.robot.touchable import MAX_PLACES
 
 _MODEL = (
     "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
@@ -36,8 +37,13 @@ def as_numbers(arm: Any) -> dict[str, np.ndarray | float]:
     n = int(arm.model.nv)
     fields = {name: array_of(getattr(arm, name), (n, *row), name) for name, row in _PER_JOINT.items()}
     single = {name: float(array_of(getattr(arm, name), (), name)) for name in ("torque_rate_max", "lever_doubted")}
-    points = len(arm.surface) if hasattr(arm.surface, "__len__") else 0
-    return {**fields, **single, "surface": array_of(arm.surface, (points, SURFACE_COLUMNS), "surface")}
+    surfaces = {name: _rows(getattr(arm, name), name) for name in ("surface", "places")}
+    return {**fields, **single, **surfaces}
+
+
+def _rows(value: Any, name: str) -> np.ndarray:
+    points = len(value) if hasattr(value, "__len__") else 0
+    return array_of(value, (points, SURFACE_COLUMNS), name)
 
 
 def array_of(value: ArrayLike, shape: tuple[int, ...], name: str, kind: str = "") -> np.ndarray:
@@ -81,8 +87,16 @@ def refuse_unsound(arm: Any) -> None:
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
-    if not np.isfinite(arm.surface).all():
-        raise InvalidInputError(f"surface of arm '{arm.name}' has a number that is not finite; give finite points")
+    for rows, name in ((arm.surface, "surface"), (arm.places, "places")):
+        if not np.isfinite(rows).all():
+            raise InvalidInputError(f"{name} of arm '{arm.name}' has a number that is not finite; give finite points")
+        if not np.isin(rows[:, 0], np.arange(arm.n + 1)).all():
+            raise InvalidInputError(f"{name} of arm '{arm.name}' has a link that is none of 0 to {arm.n}")
+    of_tool = arm.places[:, 0] == 0
+    if not 0 < len(arm.places) <= MAX_PLACES or not of_tool[-1] or (np.diff(of_tool.astype(int)) < 0).any():
+        raise InvalidInputError(
+            f"places of arm '{arm.name}' are {len(arm.places)}; give at most {MAX_PLACES}, the tool's (link 0) last"
+        )
     if not 0.0 <= arm.lever_doubted < np.inf:
         raise InvalidInputError(f"lever_doubted = {arm.lever_doubted:g} m; give a finite number from 0 on")
 

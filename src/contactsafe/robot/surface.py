@@ -14,7 +14,7 @@ SURFACE_COLUMNS = 7
 
 _ALONG, _AROUND = 5, 12
 
-_POINTS = 480
+POINTS = 480
 """Of an arm made of geoms, as many as the Panda of capsules has: searching them takes time in the tick."""
 
 _STARTS, _DIRECTIONS = 1000, 5
@@ -71,7 +71,7 @@ def geom_surface(model: mujoco.MjModel, data: mujoco.MjData, link_of: np.ndarray
         if len(points := _surface(seen, data, shown_geoms(model, link_of == link))):
             found[link] = points
     for link, points in found.items():
-        points = _spread(points, _POINTS // len(found))
+        points = spread(points, POINTS // len(found))
         points[:, :3] -= origins[link - 1]
         rows.append(np.insert(points, 0, link, axis=1))
     return np.concatenate(rows)
@@ -91,7 +91,7 @@ def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> n
     centre = data.geom_xpos[geoms].mean(axis=0)
     radius = 1.01 * np.max(np.linalg.norm(data.geom_xpos[geoms] - centre, axis=1) + model.geom_rbound[geoms])
     rng = np.random.default_rng(0)
-    starts, ends = (_on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _DIRECTIONS))
+    starts, ends = (on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _DIRECTIONS))
     directions = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
     distances, normals = np.zeros((_STARTS, _DIRECTIONS)), np.zeros((_STARTS, 3 * _DIRECTIONS))
     geom = np.zeros(_DIRECTIONS, dtype=np.int32)
@@ -104,13 +104,13 @@ def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> n
     return np.concatenate([starts + distances[..., None] * directions, normals], axis=2)[distances >= 0.0]
 
 
-def _on_sphere(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+def on_sphere(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
     """Sample points of the unit sphere, (*shape, 3)."""
     points = rng.normal(size=(*shape, 3))
-    return points / np.linalg.norm(points, axis=2, keepdims=True)
+    return points / np.linalg.norm(points, axis=-1, keepdims=True)
 
 
-def _spread(points: np.ndarray, count: int) -> np.ndarray:
+def spread(points: np.ndarray, count: int) -> np.ndarray:
     """Choose points evenly, each the furthest from those chosen before it: at most `count` of (H, 6)."""
     place = points * np.repeat([1.0, _TURN_M], 3)
     chosen, gap = [0], np.full(len(points), np.inf)

@@ -47,7 +47,8 @@ def world_dtype(n: int) -> np.dtype:
 def world_bounds(bodies: int) -> dict[str, tuple[float, float]]:
     """Return the fields of a world that change, and what they may be; the others are what it was made with."""
     ticks, measure = (-1, 2**53), (-1e9, 1e9)
-    changing = ("q_seen", "qd_seen", "tau_delayed", "wrench_bias", "friction")
+    sensed = ("joints.band", "joints.torque_bias", "joints.torque_held", "joints.qd_before")
+    changing = ("q_seen", "qd_seen", "tau_delayed", "wrench_bias", "friction", "bristle", *sensed)
     return {
         **dict.fromkeys(("tick", "push.start", "push.stop", "push.ramp", "errors.delay_ticks"), ticks),
         **dict.fromkeys(("push.point", "push.force", "push.fraction", "motor", "drag", "pushed"), measure),

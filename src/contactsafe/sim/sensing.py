@@ -17,15 +17,21 @@ from contactsafe.core.linalg import cross_into, matvec_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.friction import joint_friction_into
-from contactsafe.sim.config import WorldConfig, per_joint
+from contactsafe.sim.config import SensorConfig, WorldConfig, per_joint
+from contactsafe.sim.joint_sensors import band_gain, joint_sensors_dtype, sense_torque, velocity_noise
+from contactsafe.sim.stiction import add_stiction
 
 _f = np.float64
 _i = np.int64
 
 
-def noise_channels(n: int) -> int:
-    """Count the random numbers one tick needs: q, q̇ and torque of n joints, force, moment, accelerometer."""
-    return 3 * n + 9
+def noise_channels(n: int, sensors: SensorConfig | None = None) -> int:
+    """Count the random numbers one tick needs: q, q̇ and torque of n joints, force, moment, accelerometer.
+
+    Sensors at the joints need 2 n more, which come last: of torque, and of velocity in its band.
+    """
+    more = sensors is not None and (sensors.joint_torque or sensors.velocity_band_rad_s > 0.0)
+    return 3 * n + 9 + (2 * n if more else 0)
 
 
 @functools.cache
@@ -41,11 +47,15 @@ def errors_dtype(n: int) -> np.dtype:
             ("accelerometer_sigma", _f),
             ("encoder_step", _f),  # rad; 0 for none
             ("velocity_filter_gain", _f),  # of the difference quotient, a tick; 0 for the plant's own velocity
+            ("has_wrist", _i),  # 0 where no force sensor is there
             ("wrench_bias", _f, (6,)),  # sensor axes, N and N m
             ("tool_mass", _f),  # as the sensor's compensation believes, kg
             ("tool_com", _f, (3,)),  # mount frame, m
             ("tcp", _f, (3,)),  # mount frame, m
             ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
+            ("stiction", _f, (n,)),  # dry friction, N m
+            ("bristle", _f, (n,)),  # how far it is taken up, −1 … 1
+            ("joints", joint_sensors_dtype(n)),
             ("delay_ticks", _i),  # 0 or 1, between a command and its effect
             ("q_seen", _f, (n,)),  # last measured positions, rad
             ("qd_seen", _f, (n,)),  # last measured velocities, rad/s
@@ -69,10 +79,16 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     errors["encoder_step"] = sensors.encoder_step_rad
     if math.isfinite(sensors.velocity_filter_hz):
         errors["velocity_filter_gain"] = filter_gain(2 * math.pi * sensors.velocity_filter_hz, tick_s)
+    errors["has_wrist"] = sensors.wrist
     errors["tool_mass"], errors["tool_com"] = arm.tool.inertia.mass, arm.tool.inertia.com
     errors["tcp"] = arm.tool.tcp
     errors["friction"] = arm.friction
     errors["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
+    errors["stiction"] = per_joint(config.plant.stiction_nm, arm.n, "stiction_nm")
+    joints = errors["joints"]
+    joints["band_sigma"] = sensors.velocity_band_rad_s * band_gain(tick_s)
+    joints["has_torque"], joints["torque_sigma"] = sensors.joint_torque, sensors.joint_torque_nm
+    joints["play"], joints["rotor"] = sensors.joint_torque_play_nm, arm.model.dof_armature
     errors["delay_ticks"] = config.plant.torque_delay_ticks
 
 
@@ -96,8 +112,14 @@ def sense(world: Record, controller: Record, noise: Vector) -> None:
             rate = 0.0 if world.tick == 0 else (q - errors.q_seen[i]) / controller.params.clock.dt
             qd = errors.qd_seen[i] + errors.velocity_filter_gain * (rate - errors.qd_seen[i])
         errors.q_seen[i], errors.qd_seen[i] = q, qd
+        if errors.joints.band_sigma > 0.0:
+            qd += velocity_noise(errors.joints, i, noise[4 * n + 9 + i], controller.params.clock.dt)
         measurement.q[i], measurement.qd[i] = q, qd
-    _sense_wrench(errors, truth, controller.dynamics.rotation, measurement, noise[3 * n :])
+    measurement.has_wrench = errors.has_wrist
+    if errors.has_wrist != 0:
+        _sense_wrench(errors, truth, controller.dynamics.rotation, measurement, noise[3 * n :])
+    if errors.joints.has_torque != 0:
+        sense_torque(world, measurement, noise[3 * n + 9 :], controller.params.clock.dt)
 
 
 @compiled
@@ -120,12 +142,11 @@ def _sense_wrench(errors, truth, rotation, measurement, noise):
     moment -= cross_into(errors.tcp, force, lever_moment)
     matvec_into(rotation, force, measurement.wrench_ee[:3])
     matvec_into(rotation, moment, measurement.wrench_ee[3:])
-    measurement.has_wrench = 1
 
 
 @compiled
 def actuate(world: Record, controller: Record, noise: Vector) -> None:
-    """Fill what motors and friction put on the joints for a command: delay, torque noise, friction.
+    """Fill what motors and friction put on the joints for a command: delay, torque noise, friction, stiction.
 
     Args:
         world: `world_dtype` record; its `motor` and `drag`, (n,), N m, are filled.
@@ -139,3 +160,4 @@ def actuate(world: Record, controller: Record, noise: Vector) -> None:
         command = errors.tau_delayed[i] if errors.delay_ticks > 0 else tau[i]
         errors.tau_delayed[i] = tau[i]
         world.motor[i] = command + errors.torque_sigma * noise[2 * n + i]
+    add_stiction(errors, world.truth.qd, world.drag, controller.params.clock.dt)

@@ -117,7 +117,8 @@ class Worlds(Independent):
         for record, model, config in zip(self.records, self.models, self.configs, strict=True):
             fill_plant(record["plant"], model, config)
             fill_errors(record["errors"], arm, config, TICK_S)
-        self._noise = np.zeros((n, MAX_TICKS, noise_channels(arm.n)))
+        self._channels = [noise_channels(arm.n, config.sensors) for config in self.configs]
+        self._noise = np.zeros((n, MAX_TICKS, max(self._channels)))
         self.no_trace = np.zeros((n, 0), dtype=trace_dtype(arm.n))
         self._threads = Threads(min(n, os.cpu_count() or 1))
         self.backends = [backend(arm, config, TICK_S) for config in self.configs] if backend else []
@@ -172,6 +173,10 @@ class Worlds(Independent):
         errors["q_seen"], errors["qd_seen"], errors["tau_delayed"] = q, 0.0, gravity
         errors["wrench_bias"][:3] = sensors.force_bias_n * self.rngs[i].standard_normal(3)
         errors["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
+        if sensors.joint_torque:
+            errors["joints"]["torque_bias"] = sensors.joint_torque_bias_nm * self.rngs[i].standard_normal(self.arm.n)
+        errors["bristle"], errors["joints"]["band"], errors["joints"]["qd_before"] = 0.0, 0.0, 0.0
+        errors["joints"]["torque_held"], record["motor"], record["drag"] = gravity, gravity, 0.0
         if self.backends:
             self.backends[i].reset(q)
             self.backends[i].read(record)
@@ -215,8 +220,12 @@ class Worlds(Independent):
 
     def sample_noise(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Sample the sensors' noise for one step of worlds start to stop, in its place in (n, MAX_TICKS, channels)."""
-        for rng, noise in zip(self.rngs[start:stop], self._noise[start:stop], strict=True):
-            rng.standard_normal(out=noise)
+        for i in range(self.n)[start:stop]:
+            noise, channels = self._noise[i], self._channels[i]
+            if channels == noise.shape[1]:
+                self.rngs[i].standard_normal(out=noise)
+            else:  # a world's noise depends on nothing but its own sensors
+                noise[:, :channels] = self.rngs[i].standard_normal((len(noise), channels))
         return self._noise
 
     def in_threads(self, run: Callable[[int, int], None]) -> None:

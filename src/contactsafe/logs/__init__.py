@@ -1,0 +1,1 @@
+"""What robots recorded: reading their logs, and what the estimator makes of them."""
