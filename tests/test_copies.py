@@ -81,6 +81,24 @@ def solve(ik):
     return [ik.solve(cs.Pose(np.array([0.5, 0.1, 0.2]), np.array([0.0, 1.0, 0.0, 0.0])))]
 
 
+def estimator():
+    one = cs.ContactEstimator(cs.robots.panda())
+    one.reset(one.arm.home)
+    return one
+
+
+def feel(estimator):
+    """Feel a touch that has begun: where it is depends on the baseline before."""
+    arm, felt = estimator.arm, []
+    ticks = int(estimator.record["state"]["link_masses"]["ticks"])
+    held = arm.dynamics(arm.home, np.zeros(arm.n))["g"]
+    for k in range(ticks, ticks + 40):
+        push = np.array([2.0, 4.0, 1.0, -3.0, 0.2, 0.0, 0.0]) if k >= 20 else 0.0
+        contact = estimator.step(cs.Measurement(arm.home, np.zeros(arm.n), np.zeros(6), torque=held - push))
+        felt += [contact.torque, contact.point, contact.force]
+    return felt
+
+
 def drive(controller):
     """Swing about the home pose with a push: the residual, and so the torque, depends on all that was before."""
     arm, torques = controller.arm, []
@@ -304,6 +322,7 @@ ACTORS = {
     "NominalModel": (lambda: cs.robots.panda().nominal(), evaluate_nominal),
     "InverseKinematics": (lambda: InverseKinematics(cs.robots.panda()), solve),
     "Controller": (begun(controller, drive), drive),
+    "ContactEstimator": (begun(estimator, feel), feel),
     "Worlds": (begun(worlds, run_worlds), run_worlds),
     "Whiteboard": (lambda: Whiteboard(VARIED.board), draw),
     "Variation": (lambda: tasks()._variation, vary),
@@ -343,7 +362,7 @@ ACTORS = {
 NETWORKS = {"DeployedPolicy", "VAE", "MaskEncoder"}
 """PyTorch's own: it copies them."""
 
-BASES = {"Environment", "Independent", "TaskScenes", "Tasks"}
+BASES = {"Environment", "Independent", "Instance", "TaskScenes", "Tasks"}
 """Nothing by themselves: their subclasses have entries."""
 
 

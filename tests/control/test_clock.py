@@ -492,7 +492,7 @@ def test_no_number_in_any_field_raises_or_gives_more_torque_than_allowed(panda, 
                 field = records[0][group][name]
                 if data.draw(st.integers(0, 3)) > 0:
                     continue
-                if name in ("has_wrench", "has_time", "kept"):
+                if name in ("has_wrench", "has_torque", "has_time", "kept"):
                     records[0][group][name] = data.draw(st.integers(0, 1))
                 elif np.ndim(field) == 0 or data.draw(st.booleans()):
                     records[0][group][name] = data.draw(NUMBERS)
