@@ -13,18 +13,19 @@ PAGE = (DOCS / "concepts" / "open.md").read_text(encoding="utf-8")
 QUOTED = dict(
     re.findall(r"^python -m benchmarks\.findings (\d+)\n```\n```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 )
-WITHOUT_FIGURES = {"9"}
+TRAINED = {"9", "20", "21"}  # trainings take too long to be repeated
 ALIKE_EVERYWHERE = {"2", "10"}  # no motion that another processor would change
 
 
 def test_every_finding_of_the_page_has_a_function_and_a_figure():
     claimed = set(re.findall(r"^\*\*(\d+)\.\*\*", PAGE, re.MULTILINE))
-    assert claimed - WITHOUT_FIGURES == set(QUOTED) == {str(number) for number in FINDINGS}
+    assert claimed - TRAINED == set(QUOTED) == {str(number) for number in FINDINGS}
+    assert claimed >= TRAINED
     assert all(text.strip() for text in QUOTED.values())
 
 
 def test_the_table_lists_them_all():
-    assert set(re.findall(r"^\| \[(\d+)\]\(#", PAGE, re.MULTILINE)) == set(QUOTED)
+    assert set(re.findall(r"^\| \[(\d+)\]\(#", PAGE, re.MULTILINE)) == set(QUOTED) | TRAINED
 
 
 @pytest.mark.parametrize("number", sorted(QUOTED, key=int))
