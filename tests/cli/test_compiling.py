@@ -9,7 +9,8 @@ from contactsafe.tasks import TASKS, task_by_name
 
 
 def test_what_is_warmed_up_is_told_and_checked(capsys):
-    assert list(steps(["6", "7"]))[:3] == ["controller, 6 joints", "controller, 7 joints", "worlds"]
+    of_arms = [f"{what}, {n} joints" for what in ("controller", "estimator") for n in (6, 7)]
+    assert list(steps(["6", "7"]))[:5] == [*of_arms, "worlds"]
     with pytest.raises(InvalidInputError) as caught:
         steps(["0"])
     assert str(caught.value) == "joints = 0; give numbers from 1 to 14, such as 6,7"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.control.contact_estimator import ContactEstimator
 from contactsafe.control.controller import Controller
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.policy.action_config import ACTION_SIZE
@@ -40,6 +41,7 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
     found: dict[str, Callable[[], object]] = {
         f"controller, {word} joints": partial(_control, int(word)) for word in joints
     }
+    found |= {f"estimator, {word} joints": partial(_feel, int(word)) for word in joints}
     found["worlds"] = _run_worlds
     for name in TASKS:
         found |= {f"{name}{what}": run for what, run in _of_task(task_by_name(name)).items()}
@@ -66,6 +68,10 @@ def _do(task: str, config: Any, engine: str = "mujoco") -> None:
 
 def _control(n: int) -> None:
     Controller(_arm_of(n))
+
+
+def _feel(n: int) -> None:
+    ContactEstimator(_arm_of(n))
 
 
 def _arm_of(n: int) -> Arm:
