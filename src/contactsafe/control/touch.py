@@ -72,7 +72,8 @@ def follow_touch(c: Record) -> None:
 @inlined
 def _tool_prior(state: Record, params: Record) -> float:
     """Return how probable the tool is before the torques are asked."""
-    if state.mode != FREE:
+    tells = state.arm.has_wrench != 0 or state.arm.q.shape[0] > 6  # as `separate_tool_wrench` does
+    if state.mode != FREE and tells:
         return _NEVER_TOOL
     return _TOOL_PRIOR_SEEN if state.arm.has_wrench != 0 and params.cancel_tool_wrench != 0 else _TOOL_PRIOR
 
@@ -108,6 +109,6 @@ def _kind(touch: Record, place: Record, state: Record, pressed: float) -> tuple[
     if touch.touching == 0:
         on_tool = state.arm.has_wrench != 0 and dot(force, force) >= pressed * pressed
         return (TOOL if on_tool else NO_CONTACT), 1.0
-    if state.mode == FREE and place.tool_probability > 0.5:
+    if place.tool_probability > 0.5:
         return TOOL, place.tool_probability
     return (PUSH if state.mode == REJECT else OBSTACLE), 1.0 - place.tool_probability
