@@ -5,6 +5,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
+from tests.robot.worlds import TWO_JOINTS
 
 from contactsafe import robots
 from contactsafe.cli import main
@@ -161,12 +162,3 @@ def test_a_users_own_robot_is_replayed(tmp_path, capsys):
     np.savez(tmp_path / "log.npz", t=0.002 * np.arange(rows), q=q, qd=0.0 * q, torque=held)
     assert main(["replay", str(tmp_path / "log.npz"), "--robot", str(path), "--site", "tip"]) == 0
     assert "1 contacts in 0.8 s" in capsys.readouterr().out
-
-
-TWO_JOINTS = """<mujoco><option timestep="0.001"/><worldbody>
-  <body><joint name="a" axis="0 0 1" armature="0.1" range="-2 2"/>
-   <geom type="capsule" fromto="0 0 0 0 0 .3" size=".05"/>
-   <body pos="0 0 .3"><joint name="b" axis="0 1 0" armature="0.1" range="-2 2"/>
-    <geom type="capsule" fromto="0 0 0 .3 0 0" size=".05"/><site name="tip" pos=".35 0 0"/></body></body>
-  </worldbody>
-  <actuator><motor joint="a" ctrlrange="-50 50"/><motor joint="b" ctrlrange="-50 50"/></actuator></mujoco>"""

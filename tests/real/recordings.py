@@ -1,4 +1,7 @@
-"""Recordings of a real Panda: where they are found, what touched it, and what an estimator made of them."""
+"""Recordings of a real Panda: where they are found, what touched it, and what an estimator made of them.
+
+CONTACTSAFE_REAL_DATA=<folder> python -m tests.real.recordings      prints the figures that the documentation has
+"""
 
 import os
 from pathlib import Path
@@ -98,3 +101,29 @@ def false_starts(contacts, log):
     starts = t[np.flatnonzero(touched[1:] & ~touched[:-1]) + 1]
     near = [np.any((log["on_s"] - 0.1 <= s) & (s <= log["off_s"] + _GLOVE_S)) for s in starts]
     return int(len(starts) - sum(near))
+
+
+def figures(wrench_ee):
+    """Sum up what is felt of all touches: how many, how soon, how often falsely, how many links are right."""
+    found, franka, false, right = [], [], 0, 0
+    for name, link in TOUCHES.items():
+        log = touches(name)
+        felt = played(arm_of(name), log["t"], log["q"], log["qd"], log["tau_J"], wrench_ee, 1.0 / 90.0)
+        found.append(found_after(felt.contacts, log))
+        franka.append(first_above(np.abs(log["tau_ext"]).max(axis=1) > 1.5, log))
+        false += false_starts(felt.contacts, log)
+        right += sum(named == link for named in links_at_their_peak(felt.contacts, log))
+    after, theirs = np.concatenate(found), np.concatenate(franka)
+    return (
+        f"{np.isfinite(after).sum()} of {len(after)} felt, median {1000 * np.nanmedian(after):.0f} ms "
+        f"(Franka's own {1000 * np.nanmedian(theirs):.0f}), {false} false, link right in {right}"
+    )
+
+
+if __name__ == "__main__":
+    for named, wrench in (("zero wrench", np.zeros(6)), ("no wrench", None)):
+        t, q, qd, torque, _ = free_motion()
+        free = played(arm_of("free"), t, q, qd, torque, wrench).contacts
+        print(
+            f"{named}: {figures(wrench)}; free motion: {sum(contact.touched for contact in free)} of {len(free)} ticks"
+        )

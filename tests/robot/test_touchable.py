@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from tests.robot.worlds import TWO_JOINTS
 
 from contactsafe import robots
 from contactsafe.core.errors import InvalidInputError
@@ -98,7 +99,7 @@ def test_a_sphere_is_a_capsule_too(panda):
 
 
 def test_a_users_arm_has_its_geoms_and_its_tool(panda):
-    arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(SCENE), "tip")
+    arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(TWO_JOINTS), "tip")
     links = arm.places[arm.places[:, 0] > 0]
     np.testing.assert_array_equal(links, arm.surface)
     assert np.count_nonzero(arm.places[:, 0] == 0) >= 1
@@ -117,12 +118,3 @@ def test_a_users_arm_has_its_geoms_and_its_tool(panda):
 def test_places_that_no_arm_has_are_refused(panda, places, text):
     with pytest.raises(InvalidInputError, match=text):
         replace(panda, places=np.array(places, float))
-
-
-SCENE = """<mujoco><option timestep="0.001"/><worldbody>
-  <body><joint name="a" axis="0 0 1" armature="0.1" range="-2 2"/>
-   <geom type="capsule" fromto="0 0 0 0 0 .3" size=".05"/>
-   <body pos="0 0 .3"><joint name="b" axis="0 1 0" armature="0.1" range="-2 2"/>
-    <geom type="capsule" fromto="0 0 0 .3 0 0" size=".05"/><site name="tip" pos=".35 0 0"/></body></body>
-  </worldbody>
-  <actuator><motor joint="a" ctrlrange="-50 50"/><motor joint="b" ctrlrange="-50 50"/></actuator></mujoco>"""

@@ -156,3 +156,12 @@ MESHES = """
 """Seven joints on a tilted stand, with geoms of every type, meshes that collide and one that does not."""
 
 MESH_JOINTS = [f"j{i}" for i in range(1, 8)]
+
+TWO_JOINTS = """<mujoco><option timestep="0.001"/><worldbody>
+  <body><joint name="a" axis="0 0 1" armature="0.1" range="-2 2"/>
+   <geom type="capsule" fromto="0 0 0 0 0 .3" size=".05"/>
+   <body pos="0 0 .3"><joint name="b" axis="0 1 0" armature="0.1" range="-2 2"/>
+    <geom type="capsule" fromto="0 0 0 .3 0 0" size=".05"/><site name="tip" pos=".35 0 0"/></body></body>
+  </worldbody>
+  <actuator><motor joint="a" ctrlrange="-50 50"/><motor joint="b" ctrlrange="-50 50"/></actuator></mujoco>"""
+"""An arm of two hinges with their motors, as a user would bring it."""

@@ -42,18 +42,25 @@ def busy_worlds(preset, backend=None):
     return worlds
 
 
+def same_but_for_sizes(name, theirs, mine):
+    """Compare to the bit; sizes of forces, which nothing goes on from, to one: a sum of squares may be fused or not."""
+    if name in ("obstacle_force", "obstacle_force_peak"):
+        assert_allclose(theirs, mine, rtol=1e-14, atol=0.0, err_msg=name)
+    else:
+        assert_array_equal(theirs, mine, err_msg=name)
+
+
 @pytest.mark.parametrize("preset", ["vices", "safe"])
-def test_the_compiled_form_is_mujocos_public_api(preset):
+def test_the_compiled_form_is_mujocos_public_api_to_the_bit(preset):
     compiled, by_hand = busy_worlds(preset), busy_worlds(preset, PublicMujoco)
     traces = [run(worlds, 36 * MAX_TICKS)[0] for worlds in (compiled, by_hand)]
     for name in traces[0].dtype.names:
-        # a root of a sum of squares may round otherwise where it is compiled for another processor
-        assert_allclose(traces[1][name], traces[0][name], rtol=1e-14, atol=0.0, err_msg=name)
+        same_but_for_sizes(name, traces[1][name], traces[0][name])
     mine, theirs = compiled.datas[0], by_hand.backends[0].data
     for name in ("qpos", "qvel", "ctrl", "qfrc_applied", "sensordata"):
         assert_array_equal(getattr(theirs, name), getattr(mine, name), err_msg=name)
     for name in compiled.metrics.dtype.names:
-        assert_allclose(by_hand.metrics[name], compiled.metrics[name], rtol=1e-14, atol=0.0, err_msg=name)
+        same_but_for_sizes(name, by_hand.metrics[name], compiled.metrics[name])
     assert_array_equal(by_hand.samples, compiled.samples)
     assert np.linalg.norm(traces[0]["tool_force"], axis=1).max() > 1.0
     assert traces[0]["obstacle_force"].max() > 1.0
