@@ -18,7 +18,7 @@ def _start(noises, allowed):
 
 @compiled
 def _follow(noises, torque, steps, untouched, allowed):
-    follow_noise(noises[0], torque, steps[0], untouched, allowed)
+    follow_noise(noises[0], torque, np.zeros(torque.shape[0]), 0, steps[0], untouched, allowed)
 
 
 @compiled

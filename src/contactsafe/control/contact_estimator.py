@@ -10,7 +10,7 @@ from contactsafe.control.damping import GAIN_MARGIN
 from contactsafe.control.estimation import estimate_at
 from contactsafe.control.instance import Instance, checked_config
 from contactsafe.control.places import Place, places_of
-from contactsafe.control.presets import sensitive
+from contactsafe.control.presets import safe
 from contactsafe.control.signals import Contact, Measurement, contact_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, require_arm
@@ -30,7 +30,7 @@ class ContactEstimator(Instance):
 
     Args:
         arm: `contactsafe.robots.panda()` or another.
-        config: None for `sensitive()`; of a preset such as `contactsafe.presets.paper()` the laws are not used.
+        config: None for `safe()`; of a preset such as `contactsafe.presets.paper()` the laws are not used.
         dt: between two measurements, s.
 
     Attributes:
@@ -42,7 +42,7 @@ class ContactEstimator(Instance):
 
     def __init__(self, arm: Arm, config: ControllerConfig | None = None, dt: float = 0.001) -> None:
         super().__init__(
-            require_arm(arm), _at_rate(checked_config(sensitive() if config is None else config), dt), None, 0
+            require_arm(arm), _at_rate(checked_config(safe() if config is None else config), dt), None, 0
         )
         self.reset(np.clip(arm.home, arm.q_min, arm.q_max))
         self.step(Measurement(arm.home, np.zeros(arm.n), torque=np.zeros(arm.n)))  # compiles, or loads what was

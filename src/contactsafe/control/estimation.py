@@ -14,6 +14,7 @@ from contactsafe.control.detection import set_thresholds
 from contactsafe.control.laws import task_inertia
 from contactsafe.control.limits import runs_away
 from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
+from contactsafe.control.noise import follow_noise
 from contactsafe.control.observer import observe, start_observer
 from contactsafe.control.payload import (
     identify_payload,
@@ -89,10 +90,15 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
     untouched = state.mode == FREE and state.touch.touching == 0 and detection.quiet_ticks > 0
     _set_time(state, params, untouched)
-    observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params, untouched)
+    went_on = observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params)
     if state.clock.bridged > 0:
         return
     set_thresholds(detection, observer, masses.gravity_sigma, state.arm, dynamics.CT_qd, params)
+    if went_on:
+        follow_noise(
+            observer.noise, observer.raw, detection.model_uncertainty, observer.velocity.of_positions, state.step,
+            untouched, params.observer.residual_noise_nm,
+        )  # fmt: skip
     if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:

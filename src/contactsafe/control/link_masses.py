@@ -111,15 +111,21 @@ def identify_link_masses(
     """
     if not variance.any():
         return
-    for j in range(row.shape[0]):
-        forgotten = masses.covariance[j, j] + variance[j] * dt / FORGET_S
-        masses.covariance[j, j] = min(forgotten, variance[j])
+    if untouched:
+        _forget(masses.covariance, variance, dt)
     masses.ticks += 1
     if untouched and masses.ticks > _SETTLE_TICKS:
         error = NOISE_NM + model_uncertainty
         largest = _SIGMAS * np.sqrt(variance)
         identify_masses(masses.mass_error, masses.covariance, row, -residual, CORRELATED * error * error, largest)
     masses.gravity_sigma[i] = _gravity_sigma(masses.covariance, row)
+
+
+@compiled
+def _forget(covariance: Matrix, variance: Vector, dt: float) -> None:
+    """Let what was identified get out of date; not in a contact, which would raise the thresholds under it."""
+    for j in range(variance.shape[0]):
+        covariance[j, j] = min(covariance[j, j] + variance[j] * dt / FORGET_S, variance[j])
 
 
 @compiled

@@ -18,13 +18,17 @@ _f = np.float64
 _SLOW_1_S = 25.0
 """What changes more slowly than 4 Hz is not noise: friction, weight, a push."""
 
-_LEARN_S, _KEEP_S = 0.15, 1.0
-"""Time in which what is believed of the noise may change by a factor of e: in the first second, and later."""
+_LEARN, _LEARN_S, _KEEP_S = 0.3, 0.03, 1.0
+"""Time in which what is believed of the noise may change by a factor of e: a fraction of that for which it was
+measured, and at least and at most."""
 
-_PRIOR, _FLOOR = 2.0, 0.2
+_PRIOR, _FLOOR = 4.0, 0.2
 """Of what is allowed: the noise that is believed in at first, and the least that is told from none."""
 
 _LEAST_BANDWIDTH = 0.1
+
+_OF_POSITIONS = 0.6
+"""Most of the bandwidth for velocities from positions: one position that is read late, or was filled in, shows."""
 
 _MEDIAN = 0.6745
 """Half of a normal distribution lies within so many standard deviations."""
@@ -53,36 +57,44 @@ def start_noise(noise: Record, allowed_nm: float) -> None:
 
 
 @inlined
-def follow_noise(noise: Record, tau_external: Vector, step: Record, untouched: bool, allowed_nm: float) -> None:
+def follow_noise(
+    noise: Record, raw: Vector, model_uncertainty: Vector, of_positions: int, step: Record, untouched: bool,
+    allowed_nm: float,
+) -> None:  # fmt: skip
     """Measure the noise of the residual at full bandwidth, and set the bandwidth that keeps it to what is allowed.
+
+    What the model may be wrong by is no noise: the thresholds allow for it already.
 
     Args:
         noise: `noise_dtype` record; advanced.
-        tau_external: raw external torque, (n,), N m.
+        raw: external torque before any filter, (n,), N m.
+        model_uncertainty: of it, (n,), N m.
+        of_positions: whether any joint's velocity is a difference of positions.
         step: of the state.
         untouched: whether nothing touches the arm; else nothing is learned.
         allowed_nm: standard deviation, N m; inf for any.
     """
     if not math.isfinite(allowed_nm):
         return
-    observer_step(noise.unfiltered, step.full_filter_gain, tau_external)
+    observer_step(noise.unfiltered, step.full_filter_gain, raw)
     observer_step(noise.residual, step.full_lowpass_gain, noise.unfiltered)
     observer_step(noise.slow, filter_gain(_SLOW_1_S, step.dt), noise.residual)
     if untouched:
-        _learn(noise, step.dt, _FLOOR * allowed_nm)
-    noise.bandwidth = min(max(allowed_nm / noise.sigma.max(), _LEAST_BANDWIDTH), 1.0)
+        _learn(noise, model_uncertainty, step.dt, _FLOOR * allowed_nm)
+    most = _OF_POSITIONS if of_positions != 0 else 1.0
+    noise.bandwidth = min(max(allowed_nm / noise.sigma.max(), _LEAST_BANDWIDTH), most)
 
 
 @inlined
-def _learn(noise: Record, dt: float, least_nm: float) -> None:
+def _learn(noise: Record, model_uncertainty: Vector, dt: float, least_nm: float) -> None:
     """Follow the median of the noise, upwards or downwards by a fraction of itself.
 
     A push that begins moves it no faster than that, however hard it is.
     """
     noise.seconds += dt
-    factor = math.exp(dt / (_LEARN_S if noise.seconds < 1.0 else _KEEP_S))
+    factor = math.exp(dt / min(max(_LEARN * noise.seconds, _LEARN_S), _KEEP_S))
     for i in range(noise.sigma.shape[0]):
-        seen = abs(noise.residual[i] - noise.slow[i])
+        seen = abs(noise.residual[i] - noise.slow[i]) - model_uncertainty[i]
         noise.sigma[i] *= factor if seen > _MEDIAN * noise.sigma[i] else 1.0 / factor
         noise.sigma[i] = max(noise.sigma[i], least_nm)
 

@@ -7,7 +7,7 @@ gears is measured, that drives the links alone: friction and rotors lie before t
 import numpy as np
 
 from contactsafe.control.laws import momentum_into, observer_step
-from contactsafe.control.noise import follow_noise, noise_dtype, start_noise
+from contactsafe.control.noise import noise_dtype, start_noise
 from contactsafe.control.plausibility import BRIDGE_TICKS
 from contactsafe.control.velocity import is_of_middle, start_velocity, velocity_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
@@ -29,6 +29,7 @@ def observer_dtype(n: int) -> np.dtype:
     """Describe what the observer remembers."""
     return np.dtype(
         [
+            ("raw", _f, (n,)),  # external torque since the measurement before, N m
             ("residual", _f, (n,)),  # that the law compensates, N m
             ("residual_fast", _f, (n,)),  # that detects, N m
             ("residual_unfiltered", _f, (n,)),  # before their low-pass, N m
@@ -106,8 +107,7 @@ def rebase_momentum(observer: Record, M: Matrix, arm: Record, rotor: Vector, qd:
 @inlined
 def observe(
     observer: Record, arm: Record, clock: Record, step: Record, command: Record, dynamics: Record, params: Record,
-    untouched: bool,
-) -> None:  # fmt: skip
+) -> bool:  # fmt: skip
     """Raw external torque since the last good measurement, two observers of it, a low-pass behind each.
 
     It is a mean over the time that passed, in which what was commanded is known tick by tick.
@@ -117,12 +117,14 @@ def observe(
         arm, clock, step, command: of the state.
         dynamics: of now.
         params: `params_dtype` record.
-        untouched: whether nothing touches the arm, as far as is known.
+
+    Returns:
+        Whether they went on: a measurement was there, and one to compare it with.
     """
     n = arm.q.shape[0]
     _add_impulse(observer, arm, clock.elapsed, command, dynamics)
     if clock.bridged > 0:
-        return
+        return False
     velocity = observer.velocity
     # or the momentum of the rotors, or the difference of two velocities, would come or go at once
     same = observer.behind_gears == arm.has_torque and velocity.changed == 0
@@ -143,10 +145,10 @@ def observe(
     if arm.has_wrench != 0 and params.observer.cancel_tool_wrench != 0:
         _tool_torque_into(observer, arm.wrench_ee, dynamics.J, clock.since, step, tau_tool)
     if clock.since > BRIDGE_TICKS + 1.5 or clock.unclear != 0 or not same:
-        return
+        return False
     for i in range(n):
         tau_external[i] -= tau_tool[i]
-    follow_noise(observer.noise, tau_external, step, untouched, params.observer.residual_noise_nm)
+    observer.raw[:] = tau_external
     observer_step(observer.residual_unfiltered, step.compensation_filter_gain, tau_external)
     observer_step(observer.residual_fast_unfiltered, step.detection_filter_gain, tau_external)
     observer_step(observer.momentum_rate_unfiltered, step.detection_filter_gain, rate)
@@ -155,6 +157,7 @@ def observe(
     observer_step(observer.residual_fast, step.lowpass_gain, observer.residual_fast_unfiltered)
     observer_step(observer.momentum_rate, step.lowpass_gain, observer.momentum_rate_unfiltered)
     observer_step(observer.torque_ramp, step.lowpass_gain, observer.torque_ramp_unfiltered)
+    return True
 
 
 @inlined

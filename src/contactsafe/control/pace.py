@@ -1,6 +1,6 @@
 """How much time passed where no clock says it: from how far the joints went."""
 
-from contactsafe.control.plausibility import BRIDGE_TICKS, OVERDUE_TICKS, SLACK_RAD, furthest_astray
+from contactsafe.control.plausibility import BRIDGE_TICKS, NOISE_RAD_S, OVERDUE_TICKS, SLACK_RAD, furthest_astray
 from contactsafe.control.prediction import net_torque
 from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
@@ -10,8 +10,8 @@ from contactsafe.core.stack import stack_vector
 _SWAY = 0.15
 """Fraction of a joint's motion by which it may sway within a late tick, unseen."""
 
-_PACE_RAD2, PACE_UNKNOWN, _PACE_KNOWN, _STANDS_RAD2 = 5e-5**2, 0.25, 0.02**2, 1e-14
-"""Variance of positions; of the pace, in ticks a call, at first and at the best; joints that do not move in a tick."""
+_PACE_RAD2, PACE_UNKNOWN, _PACE_KNOWN = 5e-5**2, 0.25, 0.02**2
+"""Variance of positions; of the pace, in ticks a call, at first and at the best."""
 
 _SHAKES = 0.25
 """A joint whose velocity changes by more than this fraction of itself in half a tick does not tell its length."""
@@ -48,16 +48,19 @@ def ticks_from_motion(state: Record, m: Record, dynamics: Record, params: Record
 def learn_pace(clock: Record, m: Record, dt: float) -> None:
     """Learn how many ticks of time a call comes to where no clock says it, from how far the joints go: Kalman's filter.
 
-    A moving arm tells it precisely, one at rest not at all, and one whose velocity changes as much as it moves little:
-    what lies between two velocities is not known. A single late tick is none of it, many are.
+    A moving arm tells it precisely. One at rest tells nothing, what its velocity shows is noise, and one whose velocity
+    changes as much as it moves little: what lies between two velocities is not known. A single late tick is none of it,
+    many are.
     """
     along, squares, uncertain = 0.0, 0.0, _PACE_RAD2
     for i in range(m.q.shape[0]):
         mean, change = 0.5 * dt * (clock.qd_good[i] + m.qd[i]), 0.5 * dt * (m.qd[i] - clock.qd_good[i])
+        if abs(mean) < NOISE_RAD_S * dt:
+            continue
         along += (m.q[i] - clock.q_good[i]) * mean
         squares += mean * mean
         uncertain += max(change * change - (_SHAKES * mean) ** 2, 0.0)
-    if squares < _STANDS_RAD2:
+    if squares == 0.0:
         return
     variance, news = uncertain / squares, along / squares - clock.pace
     if news * news > 9.0 * (clock.pace_variance + variance):

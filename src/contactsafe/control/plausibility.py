@@ -26,7 +26,7 @@ UNTRUE_RAD = 1e-3
 _JUMP_NM = 10.0
 """A change of velocity that takes more than this a tick must show in the positions as well."""
 
-_NOISE_RAD_S = 0.03
+NOISE_RAD_S = 0.03
 """By so much a real robot's velocity may jump by noise alone: five times the 4 to 6 mrad/s of a Panda's."""
 
 _AT_REST_RAD_S = 1e-6
@@ -114,7 +114,7 @@ def velocity_jumps(clock: Record, m: Record, M: Matrix, time: float, dt: float) 
     """Tell whether a joint's velocity changed as nothing but a large torque changes it, and its position denies it."""
     for i in range(m.q.shape[0]):
         jump = m.qd[i] - clock.qd_good[i]
-        if abs(jump) > _NOISE_RAD_S and abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
+        if abs(jump) > NOISE_RAD_S and abs(jump) * M[i, i] > _JUMP_NM * max(time, dt):
             shown = (m.q[i] - clock.q_good[i]) / time - clock.qd_good[i]
             if shown * jump < 0.25 * jump * jump:
                 return True

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contactsafe.control.config import ControllerConfig, value_from_text
 from contactsafe.core.errors import InvalidInputError, shown
 
-__all__ = ["ABOUT", "PRESETS", "SAFE", "by_name", "paper", "safe", "sensitive", "vices"]
+__all__ = ["ABOUT", "PRESETS", "SAFE", "by_name", "paper", "safe", "vices"]
 
 
 def paper() -> ControllerConfig:
@@ -27,6 +27,8 @@ def vices() -> ControllerConfig:
 SAFE: dict[str, tuple[float | bool | str, str]] = {
     "compensation_gain": (50.0, "the printed 1.5 1/s answers a contact after most of its impulse has passed"),
     "detection_gain": (250.0, "lag of 4 ms, that of the low-pass behind it"),
+    "velocity_source": ("quieter", "a real Panda's velocity has 4 to 6 mrad/s of noise, which would look like contact"),
+    "residual_noise_nm": (0.25, "a sixth of δ: noise beyond it is filtered, or a false contact would be a matter of hours"),
     "residual_cutoff_hz": (40.0, "noise of joint velocities stays below δ, and the lag at 4 ms"),
     "friction_uncertainty": (0.3, "friction models are off by 20 %; what is left would look like contact"),
     "inertia_uncertainty": (0.15, "so are inertias; quick motion would look like contact"),
@@ -71,15 +73,6 @@ def safe() -> ControllerConfig:
     stiffness comes back, slowly, so that there is no second impact. `SAFE` says why each value is what it is.
     """
     return paper().with_(**{name: value for name, (value, _) in SAFE.items()})
-
-
-def sensitive() -> ControllerConfig:
-    """Return `safe()` with what real signals need, the default of `ContactEstimator`.
-
-    The quieter of two velocities, and noise of the residual that is filtered down to a tenth of δ. A real Panda's own
-    velocity signal has 4 to 6 mrad/s of noise between 5 and 50 Hz, which shows as contact; its positions are quiet.
-    """
-    return safe().with_(velocity_source="quieter", residual_noise_nm=0.15)
 
 
 PRESETS: dict[str, Callable[[], ControllerConfig]] = {"vices": vices, "paper": paper, "safe": safe}

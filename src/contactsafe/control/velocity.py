@@ -1,7 +1,8 @@
 """Velocity: that of the robot's own signal, or the difference of its positions, whichever is quieter.
 
-Two measurements of one velocity tell the noise of both. White noise σ_q of positions shows in their third difference,
-less what the robot's velocity says of the motion in it; by what else the two differ, the robot's signal is off.
+What a noisy velocity does to the residual is what its acceleration shows behind the detecting filters. The arm's motion
+is in both sources, a = s + n_a and b = s + n_b, so the noise of one is what it has not in common with the other:
+E n_a² = E a (a − b).
 """
 
 import numpy as np
@@ -18,19 +19,19 @@ VELOCITY_SOURCES = ("robot", "positions", "quieter")
 
 _ROBOT, _POSITIONS, _QUIETER_OF_TWO = 0, 1, 2
 
-_BAND_1_S = 300.0
-"""Noise is compared below 50 Hz: what is faster the observer filters anyway."""
+_BAND_1_S, _SLOW_1_S = 250.0, 25.0
+"""Accelerations are compared between 4 and 40 Hz: what is faster the observer filters, what is slower is motion."""
 
 _MEMORY_S = 1.0
 
 _IN_TIME = (0.3, 2.5)
 """Ticks between two measurements that are compared."""
 
-_LEAST_S, _LEAST_TICKS = 0.02, 10.0
+_LEAST_S, _LEAST_TICKS = 0.06, 10.0
 """After so long, and so many measurements, both are compared first."""
 
-_NONE = 1e-9
-"""A variance of noise that is none, rad²/s²."""
+_SETTLE_TICKS = 3.0
+"""Measurements in time from which on variances are learned."""
 
 _RESUMED = 2.0
 """Measurements in time after a gap, from which on differences of positions are compared again."""
@@ -47,12 +48,11 @@ def velocity_dtype(n: int) -> np.dtype:
             ("source", _i, (n,)),  # of it, place in `VELOCITY_SOURCES`
             ("q_before", _f, (n,)),  # rad
             ("qd_before", _f, (n,)),  # of the robot, rad/s
-            ("difference", _f, (n, 2)),  # of positions, the last one in a tick, and its change, rad
-            ("apart_difference", _f, (n, 2)),  # the same of what positions differ by from the robot's velocity, rad
-            ("apart", _f, (n,)),  # the robot's less that of positions, below 50 Hz, rad/s
-            ("apart_variance", _f, (n,)),  # rad²/s²
-            ("third_variance", _f, (n,)),  # of the third difference, rad²
+            ("by_positions", _f, (n,)),  # their last difference over its time, rad/s
+            ("filters", _f, (n, 2, 3)),  # of the acceleration of either source: below 40 Hz, twice, and below 4, rad/s²
+            ("variance", _f, (n, 2)),  # of the noise in what lies between, rad²/s⁴
             ("ticks", _f),  # in a row that were measured in time
+            ("seconds", _f),  # for which the variances were learned
             ("since_before", _f),  # ticks between the last two measurements
             ("between", _f),  # ticks between the middles of the last two gaps
             ("fresh", _i),  # 1 until the first measurement was taken
@@ -66,7 +66,8 @@ def velocity_dtype(n: int) -> np.dtype:
 def start_velocity(velocity: Record, q: Vector, qd: Vector) -> None:
     """Begin with the robot's signal."""
     velocity.qd[:], velocity.q_before[:], velocity.qd_before[:] = qd, q, qd
-    velocity.ticks, velocity.since_before, velocity.between, velocity.fresh = 0.0, 1.0, 1.0, 1
+    velocity.by_positions[:] = qd
+    velocity.ticks, velocity.seconds, velocity.since_before, velocity.between, velocity.fresh = 0.0, 0.0, 1.0, 1.0, 1
 
 
 @inlined
@@ -88,18 +89,21 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
         return since
     in_time = _IN_TIME[0] < since < _IN_TIME[1]
     velocity.ticks = velocity.ticks + 1.0 if in_time else 0.0
-    learning, velocity.of_positions = in_time and untouched and velocity.ticks > 3.0, 0
+    velocity.of_positions = 0
+    learning = in_time and untouched and velocity.ticks > _SETTLE_TICKS
+    velocity.seconds += since * dt if learning else 0.0
+    known = velocity.seconds > max(_LEAST_S, _LEAST_TICKS * dt)
     for i in range(arm.q.shape[0]):
         by_positions = (arm.q[i] - velocity.q_before[i]) / (since * dt)
-        _compare(velocity, i, by_positions, 0.5 * (arm.qd[i] + velocity.qd_before[i]), dt, learning)
+        _compare(velocity, i, by_positions, arm.qd[i], since * dt, learning)
         source = choice
         if choice == _QUIETER_OF_TWO:
-            known = velocity.ticks > max(_LEAST_TICKS, _LEAST_S / dt)
-            source = _quieter(velocity, i, dt) if known else velocity.source[i]
+            source = _quieter(velocity.variance[i], velocity.source[i]) if known else velocity.source[i]
         velocity.changed = 1 if source != velocity.source[i] else velocity.changed
         velocity.source[i], velocity.qd[i] = source, arm.qd[i]
         if source == _POSITIONS:
             velocity.qd[i], velocity.of_positions = by_positions, 1
+        velocity.by_positions[i] = by_positions
     velocity.q_before[:], velocity.qd_before[:] = arm.q, arm.qd
     if velocity.ticks < _RESUMED and velocity.of_positions != 0:
         velocity.changed = 1
@@ -115,36 +119,28 @@ def is_of_middle(velocity: Record, i: int) -> bool:
 
 @inlined
 def _compare(velocity: Record, i: int, by_positions: float, by_robot: float, dt: float, learning: bool) -> None:
-    """Follow the noise of joint i's positions, and what its two velocities differ by."""
-    apart = by_robot - by_positions
-    velocity.apart[i] += filter_gain(_BAND_1_S, dt) * (apart - velocity.apart[i])
-    third = _third_difference(velocity.difference[i], by_positions * dt)
-    beside_motion = _third_difference(velocity.apart_difference[i], -apart * dt)
-    squared = min(third * third, beside_motion * beside_motion)
+    """Follow the noise in the acceleration of joint i by either velocity."""
+    filters, variance = velocity.filters[i], velocity.variance[i]
+    by_robot = _within_band(filters[_ROBOT], (by_robot - velocity.qd_before[i]) / dt, dt)
+    by_positions = _within_band(filters[_POSITIONS], (by_positions - velocity.by_positions[i]) / dt, dt)
     if learning:
-        gain = max(1.0 / max(velocity.ticks - 3.0, 1.0), dt / _MEMORY_S)
-        velocity.apart_variance[i] += gain * (velocity.apart[i] * velocity.apart[i] - velocity.apart_variance[i])
-        velocity.third_variance[i] += gain * (squared - velocity.third_variance[i])
+        gain = dt / min(velocity.seconds, _MEMORY_S)
+        variance[_ROBOT] += gain * (by_robot * (by_robot - by_positions) - variance[_ROBOT])
+        variance[_POSITIONS] += gain * (by_positions * (by_positions - by_robot) - variance[_POSITIONS])
 
 
 @inlined
-def _third_difference(difference: Vector, first: float) -> float:
-    second = first - difference[0]
-    third = second - difference[1]
-    difference[0], difference[1] = first, second
-    return third
+def _within_band(filters: Vector, x: float, dt: float) -> float:
+    """Advance a band's filters, (3,), and return what of x is within it."""
+    gain = filter_gain(_BAND_1_S, dt)
+    filters[0] += gain * (x - filters[0])
+    filters[1] += gain * (filters[0] - filters[1])
+    filters[2] += filter_gain(_SLOW_1_S, dt) * (filters[1] - filters[2])
+    return filters[1] - filters[2]
 
 
 @inlined
-def _quieter(velocity: Record, i: int, dt: float) -> int:
-    """Return the source whose noise below 50 Hz is less; the one in force where they hardly differ.
-
-    White noise of positions has a third difference of variance 20 σ_q²; as a velocity behind a first-order filter that
-    takes up a fraction a, it has 2 a² / (2 − a) σ_q² / dt².
-    """
-    band = filter_gain(_BAND_1_S, dt)
-    of_positions = 2.0 * band * band / (2.0 - band) * velocity.third_variance[i] / (20.0 * dt * dt)
-    of_robot = max(velocity.apart_variance[i] - of_positions, 0.0)
-    if of_positions < _QUIETER * of_robot and of_robot > _NONE:
-        return _POSITIONS
-    return _ROBOT if of_robot <= _QUIETER * of_positions else int(velocity.source[i])
+def _quieter(variance: Vector, source: int) -> int:
+    """Return the source of less variance, (2,); the one in force where they hardly differ."""
+    other = _ROBOT if source == _POSITIONS else _POSITIONS
+    return other if variance[other] < _QUIETER * variance[source] else source
