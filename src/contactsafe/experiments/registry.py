@@ -8,6 +8,7 @@ from contactsafe.experiments import (
     detection,
     disturbance,
     joint_safety,
+    pushes,
     task_safety,
 )
 from contactsafe.experiments.config import Entry
@@ -23,6 +24,7 @@ ENTRIES: dict[str, Entry] = {
         disturbance.ENTRY,
         collisions.ENTRY,
         detection.ENTRY,
+        pushes.ENTRY,
         adversarial.ENTRY,
         clock.ENTRY,
     )
