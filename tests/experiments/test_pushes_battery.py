@@ -106,6 +106,7 @@ def test_figures_are_of_the_push_and_of_what_comes_after():
 @given(st.floats(0.0, 500.0))
 def test_a_run_is_never_worse_than_itself(mm):
     assert against({"tool_displacement_mm": mm}, {"tool_displacement_mm": mm}) == {
+        "baseline_mm": mm,
         "displacement_ratio": 1.0,
         "worse": 0.0,
     }

@@ -62,6 +62,7 @@ def against(mine: dict[str, float], baseline: dict[str, float]) -> dict[str, flo
     """Compare a trial's displacement with the baseline's in the same trial; see `WORSE_MM` and `FLOOR_MM`."""
     one, other = mine["tool_displacement_mm"], baseline["tool_displacement_mm"]
     return {
+        "baseline_mm": other,
         "displacement_ratio": max(one, FLOOR_MM) / max(other, FLOOR_MM),
         "worse": float(one > other + WORSE_MM and one > WORSE_FRACTION * other),
     }

@@ -133,10 +133,11 @@ def _worst(name: str, trials: Sequence[Trial], baseline: str) -> Table:
             "moves" if trial.metrics["moves"] else "holds",
             *(trial.metrics[key] for key in ("link", "force_n", "ramp_ms", "angle_deg", "stiffness_1_s2")),
             trial.metrics["tool_displacement_mm"],
-            trial.metrics["tool_displacement_mm"] / trial.metrics["displacement_ratio"],
+            trial.metrics["baseline_mm"],
+            f"contactsafe experiment pushes --trials 1 --out trial-{trial.seed} --seed {trial.seed}",
         )
         for trial in ranked[:WORST]
         if trial.metrics["worse"]
     )
-    columns = ("seed", "tool", "link", "N", "ramp (ms)", "angle (deg)", "K1 (1/s²)", "mm", f"mm, {baseline}")
+    columns = ("seed", "tool", "link", "N", "ramp (ms)", "angle (deg)", "K1 (1/s²)", "mm", f"mm, {baseline}", "replay")
     return Table(f"worst_{name}", f"Worse than {baseline}: {name}", columns, rows)

@@ -8,6 +8,7 @@ from contactsafe.experiments import (
     detection,
     disturbance,
     joint_safety,
+    localisation,
     pushes,
     task_safety,
 )
@@ -25,6 +26,7 @@ ENTRIES: dict[str, Entry] = {
         collisions.ENTRY,
         detection.ENTRY,
         pushes.ENTRY,
+        localisation.ENTRY,
         adversarial.ENTRY,
         clock.ENTRY,
     )
