@@ -103,6 +103,16 @@ def test_figures_are_of_the_push_and_of_what_comes_after():
     assert declared <= set(found)
 
 
+def test_a_tool_that_is_late_is_displaced_but_on_its_path():
+    scene = next(scene for scene in (sample_pushed_motion(ARM, seed) for seed in range(30)) if not scene.holds)
+    calm = np.zeros(round(1000 * scene.duration_s), dtype=trace_dtype(ARM.n))
+    late = calm.copy()
+    late["position"] -= 0.05 * scene.path / scene.length_m
+    found = push_metrics(late, calm, scene)
+    assert found["tool_displacement_mm"] == pytest.approx(50.0)
+    assert found["tool_off_path_mm"] == pytest.approx(0.0, abs=1e-9)
+
+
 @given(st.floats(0.0, 500.0))
 def test_a_run_is_never_worse_than_itself(mm):
     assert against({"tool_displacement_mm": mm}, {"tool_displacement_mm": mm}) == {

@@ -194,7 +194,7 @@ def _limits(
     found = {}
     for when, seen in ((STILL, 1), (MOVED, 3)):
         q, torque = postures[seen - 1], torques[seen - 1]
-        figures = {"limit_told": float(is_no_single(surface, q, torque, sigma))}
+        figures = {"limit_told": float(is_no_single(surface, postures[:seen], torques[:seen], sigma))}
         if len(scene.touches) == 1:
             (touch,) = scene.touches
             origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))

@@ -27,10 +27,10 @@ _ROWS = (
 )
 _NOTE = (
     "Limit: the posterior over points of the surface from the true torque of the contact and the noise of the sensors "
-    "alone, nothing else being unknown; moved, from three postures. Its force is that where the place is known. "
-    "Figures but the first are of contacts that were felt. In the set: one of its places, on the touched link, is no "
-    "further from the true point than the places are apart. The estimator takes every contact for "
-    "one, and says nothing of how many there are."
+    "alone, nothing else being unknown; moved, from three postures and a force that turns with its link. The limit's "
+    "force is that where the place is known. Figures but the first are of contacts that were felt. In the set: one of "
+    "its places, on the touched link, is no further from the true point than the places are apart. The estimator takes "
+    "every contact for one, and says nothing of how many there are."
 )
 
 

@@ -10,6 +10,7 @@ from contactsafe.results.metrics import ZERO, Metric
 
 METRICS = (
     Metric("tool_displacement_mm", "tool displaced by the push, most", "mm", main=True),
+    Metric("tool_off_path_mm", "of that, across its path", "mm", main=True),
     Metric("tool_error_end_mm", "tool still displaced 2 s after release", "mm", main=True),
     Metric("displacement_ratio", "displacement / that under the baseline, same trial", main=True),
     Metric("worse", "displaced more than under the baseline", main=True, aim=ZERO),
@@ -36,12 +37,14 @@ def push_metrics(trace: np.ndarray, calm: np.ndarray, scene: PushedMotion) -> di
         calm: the same controller in the same scene without the push, (T,).
         scene: what was done.
     """
-    away = 1000.0 * np.linalg.norm(trace["position"] - calm["position"], axis=1)
+    apart = 1000.0 * (trace["position"] - calm["position"])
+    away, off_path = np.linalg.norm(apart, axis=1), np.linalg.norm(_across(apart, scene.path), axis=1)
     onset, release = round(1000 * scene.meets_s), round(1000 * scene.release_s)
     speed = 1000.0 * np.abs(np.diff(trace["q"][onset:], axis=0))
     mode = trace["mode"][onset:release]
     return {
         "tool_displacement_mm": float(away[onset:release].max()),
+        "tool_off_path_mm": float(off_path[onset:release].max()),
         "tool_displacement_after_mm": float(away[release:].max()),
         "tool_error_end_mm": float(away[-1]),
         "joint_speed_peak_rad_s": float(speed.max()),
@@ -66,6 +69,15 @@ def against(mine: dict[str, float], baseline: dict[str, float]) -> dict[str, flo
         "displacement_ratio": max(one, FLOOR_MM) / max(other, FLOOR_MM),
         "worse": float(one > other + WORSE_MM and one > WORSE_FRACTION * other),
     }
+
+
+def _across(vectors: np.ndarray, path: np.ndarray) -> np.ndarray:
+    """Return what of vectors (T, 3) is across a path (3,), all of them where there is none: a late tool is on it."""
+    length = float(np.linalg.norm(path))
+    if length == 0.0:
+        return vectors
+    along = path / length
+    return vectors - np.outer(vectors @ along, along)
 
 
 def _first(true: np.ndarray) -> float:

@@ -22,8 +22,8 @@ _NOTE = (
     f"Worse: displaced more than {WORSE_MM:g} mm and more than {100 * (WORSE_FRACTION - 1):.0f} % further than under "
     "{baseline} in the same trial. Ratios are taken trial by trial; displacements below "
     f"{FLOOR_MM:g} mm count as {FLOOR_MM:g} mm in them. Displaced: from where the tool is at that time in the same run "
-    "without the push. Aims: worse in 0; with a wrench median ratio at most 0.3 and 95 % of displacements under 8 mm; "
-    "without one median ratio at most 0.5."
+    "without the push; across its path, without what is late or early along it. Aims: worse in 0; with a wrench median "
+    "ratio at most 0.3 and 95 % of displacements under 8 mm; without one median ratio at most 0.5."
 )
 
 _Figure = Callable[[Sequence[Trial]], float]
@@ -56,6 +56,8 @@ _ROWS: tuple[tuple[str, str, _Figure], ...] = (
     ("controller / {baseline}, median", "", _percentile("displacement_ratio", 50)),
     ("the same, the tool holds", "", _where(0.0, _percentile("displacement_ratio", 50))),
     ("the same, the tool moves", "", _where(1.0, _percentile("displacement_ratio", 50))),
+    ("across its path, median", "mm", _percentile("tool_off_path_mm", 50)),
+    ("across its path, 95th percentile", "mm", _percentile("tool_off_path_mm", 95)),
     ("after release, 95th percentile", "mm", _percentile("tool_displacement_after_mm", 95)),
     ("2 s after release, 95th percentile", "mm", _percentile("tool_error_end_mm", 95)),
     ("2 s after release, largest", "mm", _percentile("tool_error_end_mm", 100)),
@@ -67,12 +69,13 @@ _ROWS: tuple[tuple[str, str, _Figure], ...] = (
 )
 
 
-def push_tables(trials: Sequence[Trial], baseline: str) -> tuple[Table, ...]:
+def push_tables(trials: Sequence[Trial], baseline: str, replay: str) -> tuple[Table, ...]:
     """Compare every controller with the baseline, and list where and when it does worst.
 
     Args:
         trials: with the metrics of `push_metrics` and `against`.
         baseline: name of the controller that the others are compared with.
+        replay: what runs one of them again, with {seed} for its seed.
     """
     names = list(dict.fromkeys(trial.controller for trial in trials))
     scenarios = list(dict.fromkeys(trial.scenario for trial in trials))
@@ -87,7 +90,7 @@ def push_tables(trials: Sequence[Trial], baseline: str) -> tuple[Table, ...]:
     )
     title = f"Every controller against {baseline}, trial by trial"
     verdict = Table("verdict", title, ("figure", "unit", *columns), rows, _NOTE.format(baseline=baseline))
-    worst = [_worst(name, of, baseline) for name, of in columns.items() if _count("worse")(of)]
+    worst = [_worst(name, of, baseline, replay) for name, of in columns.items() if _count("worse")(of)]
     return (verdict, _classes(columns), *worst)
 
 
@@ -125,7 +128,7 @@ def _in_words(trials: Sequence[Trial]) -> str:
     return f"{middle:.1f}  {high:.1f}  {_count('worse')(trials)}"
 
 
-def _worst(name: str, trials: Sequence[Trial], baseline: str) -> Table:
+def _worst(name: str, trials: Sequence[Trial], baseline: str, replay: str) -> Table:
     ranked = sorted(trials, key=lambda t: -t.metrics["tool_displacement_mm"] * t.metrics["worse"])
     rows: tuple[tuple[str | float, ...], ...] = tuple(
         (
@@ -134,7 +137,7 @@ def _worst(name: str, trials: Sequence[Trial], baseline: str) -> Table:
             *(trial.metrics[key] for key in ("link", "force_n", "ramp_ms", "angle_deg", "stiffness_1_s2")),
             trial.metrics["tool_displacement_mm"],
             trial.metrics["baseline_mm"],
-            f"contactsafe experiment pushes --trials 1 --out trial-{trial.seed} --seed {trial.seed}",
+            replay.format(seed=trial.seed),
         )
         for trial in ranked[:WORST]
         if trial.metrics["worse"]

@@ -87,7 +87,8 @@ def run_pushes(
     """
     if not controllers or not seeds:
         raise InvalidInputError(f"{len(controllers)} controllers, {len(seeds)} seeds; give one or more of each")
-    arm = robots.panda() if arm is None else require_arm(arm)
+    usual = robots.panda()
+    arm = usual if arm is None else require_arm(arm)
     batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
@@ -98,8 +99,18 @@ def run_pushes(
     trials = compared([trial for of_batch, _ in done for trial in of_batch], baseline)
     return Experiment(
         NAME, "Pushes", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,),
-        tables=push_tables(trials, baseline),
+        tables=push_tables(trials, baseline, _replay(controllers, arm, usual)),
     )  # fmt: skip
+
+
+def _replay(controllers: Mapping[str, ControllerConfig], arm: Arm, usual: Arm) -> str:
+    """Return how one seed is run again, with {seed} in its place."""
+    if (arm.description, arm.tool) != (usual.description, usual.tool):
+        return "run_pushes(controllers, [{seed}], arm=arm)"
+    if not all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
+        return "run_pushes(controllers, [{seed}])"
+    words = f"--controllers {','.join(controllers)} --trials 1"
+    return f"contactsafe experiment pushes {words} --out trial-{{seed}} --seed {{seed}}"
 
 
 def _run_batch(

@@ -28,6 +28,10 @@ _ABOUT_M = 0.05
 _LOGISTIC = 1.702  # of a logistic distribution that is nearly the normal one
 
 
+_BESIDE = 0.35  # a contact is beside its point by this part of how far they are apart, standard deviation along an axis
+_FINE = 5  # points of the finer grid, in a row
+_POSSIBLE = 12.0  # log of how much less probable than the best a point may seem before a finer grid tells
+_NEAREST = 100  # points about which the finer grid looks for a single contact
 _SINGLE_N = 100.0  # standard deviation of a force of which nothing is known
 _Z_99 = 2.326  # standard normal number below which are 99 %
 
@@ -63,6 +67,21 @@ class Surface:
         local = self.rows[:, 1:4] + self.on_tool[:, None] * np.array(tool.tcp)
         points = origins[self.links] + np.einsum("pij,pj->pi", rotations[self.links], local)
         return points, np.einsum("pij,pj->pi", rotations[self.links], self.rows[:, 4:])
+
+    def refined(self, chosen: np.ndarray) -> "Surface":
+        """Return a finer grid about some of the points, indices (K,): `_FINE`² points in place of each, in its order.
+
+        They lie in the plane that touches the surface at their point, from which it is a fraction of a millimetre away.
+        """
+        normals = self.rows[chosen, 4:]
+        across = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        steps = self.apart * ((np.arange(_FINE) + 0.5) / _FINE - 0.5)
+        u, v = (offsets.ravel() for offsets in np.meshgrid(steps, steps))
+        rows = np.repeat(self.rows[chosen], _FINE**2, axis=0)
+        rows[:, 1:4] += np.tile(u, len(chosen))[:, None] * np.repeat(across, _FINE**2, axis=0)
+        rows[:, 1:4] += np.tile(v, len(chosen))[:, None] * np.repeat(np.cross(normals, across), _FINE**2, axis=0)
+        return Surface(self.arm, rows, self.apart / _FINE)
 
 
 def dense_surface(arm: Arm) -> Surface:
@@ -124,6 +143,8 @@ def belief(
 ) -> Belief:
     """Return the posterior over a surface after the torques of some postures; points where the last has them.
 
+    The force is the same in all of them, in the frame of the touched link.
+
     Args:
         surface: of the arm.
         q: postures, each (n,), rad.
@@ -136,30 +157,31 @@ def belief(
     prior = np.where(on_tool, tool_prior / tools, (1.0 - tool_prior) / max(len(on_tool) - tools, 1))
     with np.errstate(divide="ignore"):
         log = np.log(prior)
-    for posture, felt in zip(q, torque, strict=True):
-        log += _evidence(surface, posture, felt, sigma)
-    probability = np.exp(log - log.max())
+    rough = log + _evidence(surface, q, torque, sigma)
+    chosen = np.flatnonzero(rough > rough.max() - _POSSIBLE)
+    log = np.repeat(log[chosen], _FINE**2) + _evidence(surface.refined(chosen), q, torque, sigma)
+    probability = np.zeros(len(prior))
+    probability[chosen] = np.exp(log - log.max()).reshape(len(chosen), -1).sum(axis=1)
     return Belief(surface.links, surface.at(q[-1])[0], probability / probability.sum())
 
 
-def is_no_single(surface: Surface, q: np.ndarray, torque: np.ndarray, sigma: float) -> bool:
-    """Tell whether no single force, whatever it is, on any point of the links explains a torque.
+def is_no_single(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> bool:
+    """Tell whether no single force that turns with its link, on any point of the links, explains torques.
 
-    What is left of it where it is explained best would be so large by noise in fewer than one of a hundred contacts.
+    What is left of them where they are explained best would be so large by noise in fewer than one of a hundred.
 
     Args:
         surface: of the arm.
-        q: (n,), rad.
-        torque: with the noise of the sensors, (n,), N m.
+        q: postures, each (n,), rad.
+        torque: in each, with the noise of the sensors, (n,), N m.
         sigma: standard deviation of that noise, N m.
     """
-    points, _ = surface.at(q)
-    anywhere = np.full((len(points), 3, 3), _SINGLE_N**2 * np.eye(3))
-    C, _ = _covariance(surface, q, (points, anywhere), torque, sigma)
-    left = np.linalg.solve(C, np.broadcast_to(torque[:, None], (len(points), len(torque), 1)))[..., 0] @ torque
-    free = max(len(torque) - 3, 1)
+    on_links = np.flatnonzero(~surface.on_tool)
+    nearest = np.argsort(_left_over(surface, q, torque, sigma)[on_links])[:_NEAREST]
+    left = _left_over(surface.refined(on_links[nearest]), q, torque, sigma)
+    free = max(surface.arm.n * len(q) - 3, 1)
     most = free * (1.0 - 2.0 / (9.0 * free) + _Z_99 * math.sqrt(2.0 / (9.0 * free))) ** 3  # Wilson & Hilferty 1931
-    return bool(left[~surface.on_tool].min() > most)
+    return bool(left.min() > most)
 
 
 def jacobians(arm: Arm, q: np.ndarray, points: np.ndarray, links: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,35 +200,63 @@ def jacobians(arm: Arm, q: np.ndarray, points: np.ndarray, links: np.ndarray) ->
     return linear.swapaxes(1, 2), (axes * moved[..., None]).swapaxes(1, 2)
 
 
-def _covariance(
-    surface: Surface, q: np.ndarray, forces: tuple[np.ndarray, np.ndarray], torque: np.ndarray, sigma: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the covariance of the torque if the contact is at each point, (P, n, n), and the Jacobians, (P, 3, n).
+@dataclass(frozen=True)
+class _Information:
+    """What torques tell of one force on each point, the same in the link's frame in all postures.
 
-    Args:
-        surface, q, torque, sigma: as of `belief`.
-        forces: points, (P, 3), m, and covariance of the force there, (P, 3, 3), N².
+    Attributes:
+        A: of the force, (P, 3, 3), 1/N².
+        b: A times the force, (P, 3), 1/N.
+        log: of the probability of the torques if there were no force, up to a constant, (P,).
+        left: square of the torques over the noise's variance, (P,).
     """
-    points, S = forces
-    J, J_angular = jacobians(surface.arm, q, points, surface.links)
-    moment = (0.5 * surface.apart * np.linalg.norm(torque) / _LEVER_M) ** 2
-    C = sigma**2 * np.eye(len(torque)) + J.swapaxes(1, 2) @ S @ J
-    return C + moment * J_angular.swapaxes(1, 2) @ J_angular, J
+
+    A: np.ndarray
+    b: np.ndarray
+    log: np.ndarray
+    left: np.ndarray
 
 
-def _evidence(surface: Surface, q: np.ndarray, torque: np.ndarray, sigma: float) -> np.ndarray:
-    """Return the log of the probability of a torque if the contact is at each point, up to a constant, (P,)."""
-    points, normals = surface.at(q)
+def _information(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> _Information:
+    """Add up over postures what the torques tell; a contact beside its point has a moment about it as well.
+
+    The noise of a posture has the covariance N = σ² I + s² J_ωᵀ J_ω; its inverse is that of Woodbury.
+    """
+    count, n = len(surface.rows), surface.arm.n
+    A, b, log, left = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    for posture, felt in zip(q, torque, strict=True):
+        rotations = link_frames(description_and_tool(surface.arm)[0], posture[None])[1][0, surface.links]
+        J, turns = jacobians(surface.arm, posture, surface.at(posture)[0], surface.links)
+        local = rotations.swapaxes(1, 2) @ J
+        moment = (_BESIDE * surface.apart * np.linalg.norm(felt) / _LEVER_M) ** 2 + 1e-12
+        inner = np.linalg.inv(sigma**2 / moment * np.eye(3) + turns @ turns.swapaxes(1, 2))
+        known_local = (local - (local @ turns.swapaxes(1, 2)) @ inner @ turns) / sigma**2  # times N⁻¹
+        known_felt = (felt - (((turns @ felt)[:, None] @ inner) @ turns)[:, 0]) / sigma**2
+        A += known_local @ local.swapaxes(1, 2)
+        b += known_local @ felt
+        left += known_felt @ felt
+        log += 0.5 * np.linalg.slogdet(inner * (sigma**2 / moment))[1] - n * math.log(sigma)
+    return _Information(A, b, log - 0.5 * left, left)
+
+
+def _left_over(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> np.ndarray:
+    """Return what a force on each point leaves of the torques, its square over the noise's variance, (P,)."""
+    of = _information(surface, q, torque, sigma)
+    force = np.linalg.solve(of.A + np.eye(3) / _SINGLE_N**2, of.b[..., None])[..., 0]
+    return of.left - np.einsum("pi,pi->p", of.b, force)
+
+
+def _evidence(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> np.ndarray:
+    """Return the log of the probability of torques if the contact is at each point, up to a constant, (P,)."""
+    of, normals = _information(surface, q, torque, sigma), surface.rows[:, 4:]
     S = force_covariance(normals, np.where(surface.on_tool, NORMAL_N, ACROSS_N))
-    C, J = _covariance(surface, q, (points, S), torque, sigma)
-    explained = np.linalg.solve(C, np.broadcast_to(torque[:, None], (len(points), len(torque), 1)))[..., 0]
-    log = -0.5 * explained @ torque - 0.5 * np.linalg.slogdet(C)[1]
-    SJ = S @ J
-    outwards = np.einsum("pi,pij,pj->p", normals, SJ, explained)
-    left = S - SJ @ np.linalg.solve(C, SJ.swapaxes(1, 2))
-    spread = np.sqrt(np.maximum(np.einsum("pi,pij,pj->p", normals, left, normals), 0.0))
-    inwards = math.log(2.0) - np.logaddexp(0.0, _LOGISTIC * outwards / np.maximum(spread, 1e-9))
-    return log + np.where(surface.on_tool, 0.0, inwards)
+    covariance = np.linalg.inv(of.A + np.linalg.inv(S))
+    force = np.einsum("pij,pj->pi", covariance, of.b)
+    log = of.log + 0.5 * np.einsum("pi,pi->p", of.b, force)
+    log += 0.5 * (np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(S)[1])
+    spread = np.sqrt(np.einsum("pi,pij,pj->p", normals, covariance, normals))
+    outwards = _LOGISTIC * np.einsum("pi,pi->p", normals, force) / spread
+    return log + np.where(surface.on_tool, 0.0, math.log(2.0) - np.logaddexp(0.0, outwards))
 
 
 def force_covariance(normals: np.ndarray, across_n: np.ndarray) -> np.ndarray:
