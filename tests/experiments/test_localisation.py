@@ -178,6 +178,12 @@ def test_sets_hold_the_truth_as_often_as_they_claim_and_shrink_as_the_arm_moves(
     assert places[1] < 0.6 * places[0]
 
 
+def test_a_wrench_of_zero_rules_the_tool_out():
+    _, q, torque, _ = of_one(0)
+    both, arm_alone = (belief(SURFACE, [q], [torque], 0.2, prior) for prior in (0.4, 0.0))
+    assert_allclose(both.given(~SURFACE.on_tool).probability, arm_alone.probability, atol=1e-4)
+
+
 def test_nothing_felt_says_nothing_of_arm_or_tool():
     known = belief(SURFACE, [ARM.home], [np.zeros(ARM.n)], 1e3, 0.4)
     assert known.probability[SURFACE.on_tool].sum() == pytest.approx(0.4, abs=0.05)

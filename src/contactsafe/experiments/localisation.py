@@ -118,12 +118,12 @@ def _run_batch(
     scenes = [sample_touch_scene(arm, seed, contacts) for seed in seeds]
     trials: list[Trial] = []
     for scene, sensed in zip(scenes, sense(arm, scenes, plant == "real"), strict=True):
+        limits = _limits(surface, scene, sensed, plant)
         for wrench in dict.fromkeys(wrench for wrench, _ in _scenarios(contacts)):
-            limits = _limits(surface, scene, sensed, wrench, plant)
             for name, estimator in estimators.items():
                 for when, figures in _estimate(estimator, scene, sensed, wrench).items():
                     heading = ", ".join([TWO] * (contacts - 1) + [when, wrench])
-                    figures = _named(figures | limits[when], contacts, when)
+                    figures = _named(figures | limits[wrench, when], contacts, when)
                     trials.append(Trial(heading, name, scene.motion.seed, figures, plant))
     return trials
 
@@ -179,28 +179,27 @@ def _figures(estimator: ContactEstimator, contact: Contact, scene: TouchScene, q
     }
 
 
-def _limits(
-    surface: Surface, scene: TouchScene, sensed: Sensed, wrench: str, plant: str
-) -> dict[str, dict[str, float]]:
-    """Return what the true torques with the sensors' noise alone would tell at the same moments.
+def _limits(surface: Surface, scene: TouchScene, sensed: Sensed, plant: str) -> dict[tuple[str, str], dict[str, float]]:
+    """Return what the true torques with the sensors' noise alone would tell at the same moments, by scenario.
 
     Of two contacts that is whether a single one explains them; once the arm has moved, three postures are known.
     """
     arm, sensors = surface.arm, FRANKA_SENSORS if plant == "real" else QUIET_SENSORS
     sigma = math.hypot(sensors.joint_torque_nm, sensors.joint_torque_play_nm)
-    rng, prior = scene_rng(scene.motion.seed, 6), TOOL_PRIOR if wrench == NONE else 0.0
+    rng = scene_rng(scene.motion.seed, 6)
     postures = [sensed.q_true[tick - 1] for tick in (STILL_MS, (STILL_MS + MOVED_MS) // 2, MOVED_MS)]
     torques = [true_torque(arm, scene, q) + sigma * rng.standard_normal(arm.n) for q in postures]
     found = {}
     for when, seen in ((STILL, 1), (MOVED, 3)):
-        q, torque = postures[seen - 1], torques[seen - 1]
-        figures = {"limit_told": float(is_no_single(surface, postures[:seen], torques[:seen], sigma))}
-        if len(scene.touches) == 1:
-            (touch,) = scene.touches
-            origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))
-            point, true_force = touch.in_world(origins, rotations)
-            known = belief(surface, postures[:seen], torques[:seen], sigma, prior)
-            force = force_at(arm, q, (touch.link, point, rotations[touch.link] @ touch.inwards), torque, sigma)
-            figures |= limit_metrics(known, force, surface.apart, (touch.link, point), true_force)
-        found[when] = figures
+        told = {"limit_told": float(is_no_single(surface, postures[:seen], torques[:seen], sigma))}
+        found[ZERO, when] = found[NONE, when] = told
+        if len(scene.touches) > 1:
+            continue
+        (touch,), q, torque = scene.touches, postures[seen - 1], torques[seen - 1]
+        origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))
+        point, true_force = touch.in_world(origins, rotations)
+        force = force_at(arm, q, (touch.link, point, rotations[touch.link] @ touch.inwards), torque, sigma)
+        known = belief(surface, postures[:seen], torques[:seen], sigma, TOOL_PRIOR)
+        for wrench, of in ((NONE, known), (ZERO, known.given(~surface.on_tool))):
+            found[wrench, when] = told | limit_metrics(of, force, surface.apart, (touch.link, point), true_force)
     return found

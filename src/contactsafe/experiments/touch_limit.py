@@ -132,6 +132,11 @@ class Belief:
         link = np.argmax(np.bincount(self.links, weights=self.probability))
         return int(link), about @ points / about.sum()
 
+    def given(self, allowed: np.ndarray) -> "Belief":
+        """Return what is believed once the contact is known to be on some of the points, booleans (P,)."""
+        left = np.where(allowed, self.probability, 0.0)
+        return Belief(self.links, self.points, left / left.sum())
+
     def likeliest(self, fraction: float) -> np.ndarray:
         """Return which points together have a fraction of the probability, likeliest first."""
         order = np.argsort(-self.probability, kind="stable")
