@@ -10,7 +10,7 @@ from benchmarks.findings.printing import say
 from benchmarks.findings.scenes import PUSH_N, Loop
 
 from contactsafe.experiments.false_alarms import false_alarm_trials, sample_strokes
-from contactsafe.experiments.pushes import CONTACT, point_torque, sample_push
+from contactsafe.experiments.onsets import CONTACT, point_torque, sample_push
 from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.shape import link_frames
 

@@ -11,7 +11,7 @@ from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.detection import detection, reporting
 from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_trials, sample_strokes
-from contactsafe.experiments.pushes import (
+from contactsafe.experiments.onsets import (
     CONTACT,
     STEP,
     Push,

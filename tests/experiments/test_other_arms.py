@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from contactsafe.core.errors import InvalidInputError, UnreachableError
-from contactsafe.experiments import adversarial, clock, collisions, detection
+from contactsafe.experiments import adversarial, clock, collisions, detection, localisation, pushes
 from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.robot import robots
@@ -19,6 +19,8 @@ FIRST_CALL = {
     "clock": (clock, "sample_scene"),
     "collisions": (collisions, "_run_batch"),
     "detection": (detection, "push_trials"),
+    "localisation": (localisation, "dense_surface"),
+    "pushes": (pushes, "_run_batch"),
 }
 
 

@@ -112,14 +112,20 @@ def sample_plant(rng: np.random.Generator, n: int) -> PlantConfig:
     )
 
 
-def sample_motion(arm: Arm, seed: int) -> Motion:
+def sample_motion(arm: Arm, seed: int, slides: bool | None = None, holds: bool | None = None) -> Motion:
     """Sample what the tool does: a sweep of 20 to 45 cm at 0.1 to 0.5 m/s or a hold, in free air or sliding.
+
+    Args:
+        arm: that moves.
+        seed: of the scene.
+        slides, holds: None to sample them as well.
 
     Raises:
         UnreachableError: the arm reaches none.
     """
     rng = scene_rng(seed, 0)
-    slides, holds, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    sliding, holding, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    slides, holds = sliding if slides is None else slides, holding if holds is None else holds
     speed = rng.uniform(0.1, 0.3 if slides else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)

@@ -11,7 +11,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import false_alarms
 from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.experiments.false_alarms import FREE, SLIDING, false_alarm_trials, sample_strokes
-from contactsafe.experiments.pushes import CONTACT, NAMED_AFTER_MS, STEP, push_trials, pushed_links
+from contactsafe.experiments.onsets import CONTACT, NAMED_AFTER_MS, STEP, push_trials, pushed_links
 from contactsafe.results.experiment import Experiment, Table, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric
 from contactsafe.robot.arm import Arm

@@ -78,16 +78,21 @@ class Playback(Independent):
 
 
 def record(worlds: Worlds, motions: Sequence[Motion]) -> list[np.ndarray]:
-    """Play motions to their end.
+    """Play motions from their beginning to their end; see `record_rest`."""
+    return record_rest(Playback(worlds, motions))
+
+
+def record_rest(play: Playback) -> list[np.ndarray]:
+    """Play motions on to their end, from where they are.
 
     Returns:
         One array of `trace_dtype` records for each, one a ms.
     """
-    play = Playback(worlds, motions)
+    begun, worlds = play.ticks, play.worlds
     step = np.zeros((worlds.n, MAX_TICKS), dtype=trace_dtype(worlds.arm.n))
-    traces = np.zeros((worlds.n, int(play.lengths.max()) + MAX_TICKS), dtype=step.dtype)
+    traces = np.zeros((worlds.n, int(play.lengths.max()) - begun + MAX_TICKS), dtype=step.dtype)
     while play.running.any():
-        start = play.ticks
+        start = play.ticks - begun
         ticks = play.step(step)
         traces[:, start : start + ticks] = step[:, :ticks]
-    return [trace[:length] for trace, length in zip(traces, play.lengths, strict=True)]
+    return [trace[: length - begun] for trace, length in zip(traces, play.lengths, strict=True)]

@@ -1,165 +1,166 @@
-"""Pushes on random points of a moving arm: how soon is one reported, and which link is named?"""
+"""Pushes as people give them: on any point of the arm, from any side, sudden or slow: how far does the tool stray?"""
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
-from contactsafe.control.codes import FREE
+from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
-from contactsafe.experiments.collision_motions import sample_motion, scene_rng
-from contactsafe.experiments.motions import Playback
-from contactsafe.experiments.surfaces import clearance, sample_surface_point
-from contactsafe.policy.rate import POLICY_RATE_HZ
-from contactsafe.results.experiment import Trial
-from contactsafe.robot.arm import Arm, description_and_tool
-from contactsafe.robot.shape import link_frames
-from contactsafe.sim.truth import trace_dtype
-from contactsafe.sim.worlds import MAX_TICKS, Worlds
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.config import BATCH, Entry, ExperimentConfig, Progress
+from contactsafe.experiments.motions import Playback, record_rest
+from contactsafe.experiments.push_metrics import METRICS, against, push_metrics
+from contactsafe.experiments.push_scenes import PushedMotion, sample_pushed_motion
+from contactsafe.experiments.push_tables import push_tables
+from contactsafe.results.experiment import Experiment, Trial
+from contactsafe.results.figures import Figure, Panel, length, scalar
+from contactsafe.results.metrics import BASELINE
+from contactsafe.results.recording import Recording
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm, require_arm
+from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.sim.worlds import Worlds
 
-STEP, CONTACT = "step of 3 N m", "contact of 10 to 60 N"
-STEP_NM = 3.0
-"""Largest joint torque of a step."""
+NAME = "pushes"
+QUESTION = (
+    "Somebody pushes a random point of the arm with 8 to 30 N for 1.5 s, along its normal, obliquely or sideways, "
+    "within 0.02 to 1 s, while the tool holds or moves: how far is the tool displaced, and does it come back?"
+)
+WITH_WRENCH, WITHOUT = "with wrench", "without wrench"
+"""Whether a force sensor at the wrist tells the controller that nothing touches the tool."""
 
-FORCE_N = (10.0, 60.0)
-NAMED_AFTER_MS = 30
-"""When the reported link is looked at, since the onset."""
-
-_TOUCHING_M = 1e-6  # rounding: a point of the surface is this far within it at most
-_LEVER_M = 0.03  # least joint torque of a newton for a step: 3 N m take at most 100 N
-_AFTER_STEPS = 4  # policy steps recorded from the onset on: 66 or 67 ms
-
-
-def pushed_links(arm: Arm) -> range:
-    """Return the links that are pushed: all from the third on, where a push moves the joints of the base well."""
-    return range(3, arm.n + 1)
-
-
-@dataclass(frozen=True)
-class Push:
-    """A push on the arm's surface, inwards along its normal.
-
-    Attributes:
-        link: that is pushed.
-        point: in the link's frame, (3,), m.
-        force: world axes, (3,), N.
-        torque: on the joints at the onset, (n,), N m.
-    """
-
-    link: int
-    point: np.ndarray
-    force: np.ndarray
-    torque: np.ndarray
+CURVES = Figure(
+    plots=(
+        (
+            Panel("tool away from its run without the push", "mm", length("error", 1000.0)),
+            Panel("mode: 0 free, 1 comply, 2 reject", "", scalar("mode")),
+            Panel("torque of the push, joint by joint", "N m", lambda run: run.trace["tau_arm"]),
+        ),
+    ),
+    caption="Displacement of the tool, the controller's mode, and what the push puts on the joints.",
+)
 
 
-def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str) -> Push:
-    """Sample a push on a point of the arm that nothing of the arm covers.
-
-    A step has the force that makes its largest joint torque `STEP_NM`; points that would take more than 100 N for it
-    are sampled anew. A contact has any point, and a force of `FORCE_N`, log-uniform.
+def pushes(config: ExperimentConfig, progress: Progress | None = None) -> Experiment:
+    """Run the battery; it needs no policy.
 
     Args:
-        arm: built from a description.
-        q: its joint positions, (n,), rad.
-        rng: of the sample.
-        scenario: `STEP` or `CONTACT`.
+        config: controllers, arm and seeds.
+        progress: told of every trial done.
     """
-    origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
-    while True:
-        link = int(rng.choice(pushed_links(arm)))
-        point, normal = sample_surface_point(arm, link, rng)
-        size = math.exp(rng.uniform(*np.log(FORCE_N)))
-        place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal
-        covered = clearance(arm, q[None], place) < -_TOUCHING_M  # by another link
-        if covered or clearance(arm, q[None], place - 1e-3 * inwards) < 0.5e-3:
-            continue
-        torque = point_torque(origins[0], rotations[0], link, place, inwards)
-        if scenario == STEP:
-            lever = float(np.abs(torque).max())
-            if lever < _LEVER_M:
-                continue
-            size = STEP_NM / lever
-        return Push(link, point, size * inwards, size * torque)
+    controllers = {name: presets.by_name(name) for name in config.controllers}
+    return run_pushes(controllers, config.seeds, progress, config.arm)
 
 
-def point_torque(
-    origins: np.ndarray, rotations: np.ndarray, link: int, place: np.ndarray, force: np.ndarray
-) -> np.ndarray:
-    """Return the joint torque of a force on a point of a link, Jᵀ f, (n,), N m.
+ENTRY = Entry(
+    NAME,
+    "somebody pushes the arm, anywhere and from any side.",
+    pushes,
+    count=lambda config: config.count(2),
+    trials=100,
+)
+
+
+def run_pushes(
+    controllers: Mapping[str, ControllerConfig],
+    seeds: Sequence[int],
+    progress: Progress | None = None,
+    arm: Arm | None = None,
+) -> Experiment:
+    """Give controllers the same pushes. A seed's trial does not depend on the others.
 
     Args:
-        origins, rotations: frames of `link_frames` in one posture, (n + 2, 3) m and (n + 2, 3, 3).
-        link: 1 … n.
-        place: of the point, world, (3,), m.
-        force: world axes, (3,), N.
+        controllers: configurations by name; they are compared with 'vices' where it is among them, else with the first.
+        seeds: one a scene: of motion, plant, push and noise.
+        progress: told how many trials were just done.
+        arm: that is pushed; None for a Panda.
+
+    Returns:
+        Two trials for each seed and controller, with and without the wrist's wrench; recordings of the first seed;
+        tables of the comparison.
+
+    Raises:
+        InvalidInputError: no controller, or no seed.
     """
-    axes, levers = rotations[1:-1, :, 2], place - origins[1:-1]
-    torque = np.einsum("ik,ik->i", axes, np.cross(levers, force))
-    torque[link:] = 0.0
-    return torque
+    if not controllers or not seeds:
+        raise InvalidInputError(f"{len(controllers)} controllers, {len(seeds)} seeds; give one or more of each")
+    usual = robots.panda()
+    arm = usual if arm is None else require_arm(arm)
+    batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        done = list(pool.map(lambda batch: _run_batch(arm, batch, controllers, progress, batch is batches[0]), batches))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    baseline = BASELINE if BASELINE in controllers else next(iter(controllers))
+    trials = compared([trial for of_batch, _ in done for trial in of_batch], baseline)
+    return Experiment(
+        NAME, "Pushes", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,),
+        tables=push_tables(trials, baseline, _replay(controllers, arm, usual)),
+    )  # fmt: skip
 
 
-def push_trials(arm: Arm, name: str, controller: ControllerConfig, seeds: Sequence[int], scenario: str) -> list[Trial]:
-    """Push the arm once in each scene, while it moves, and see when and where a contact is reported.
+def _replay(controllers: Mapping[str, ControllerConfig], arm: Arm, usual: Arm) -> str:
+    """Return how one seed is run again, with {seed} in its place."""
+    if (arm.description, arm.tool) != (usual.description, usual.tool):
+        return "run_pushes(controllers, [{seed}], arm=arm)"
+    if not all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
+        return "run_pushes(controllers, [{seed}])"
+    words = f"--controllers {','.join(controllers)} --trials 1"
+    return f"contactsafe experiment pushes {words} --out trial-{{seed}} --seed {{seed}}"
 
-    Args:
-        arm: built from a description.
-        name: of the controller.
-        controller: that reports contacts.
-        seeds: of the scenes.
-        scenario: `STEP` or `CONTACT`.
+
+def _run_batch(
+    arm: Arm,
+    seeds: Sequence[int],
+    controllers: Mapping[str, ControllerConfig],
+    progress: Progress | None,
+    recorded: bool,
+) -> tuple[list[Trial], list[Recording]]:
+    """Return the trials of some seeds, and recordings of the first of them where wanted."""
+    scenes = [sample_pushed_motion(arm, seed) for seed in seeds]
+    trials: list[Trial] = []
+    recordings: list[Recording] = []
+    for scenario in (WITH_WRENCH, WITHOUT):
+        sensors = replace(REAL_SENSORS, wrist=scenario == WITH_WRENCH)
+        worlds = Worlds(
+            arm, [WorldConfig(scene.plant, sensors, fixtures=()) for scene in scenes], None, len(scenes), seeds
+        )
+        for name, controller in controllers.items():
+            worlds.use(controller)
+            calm, pushed = (run_pushed(worlds, scenes, with_push) for with_push in (False, True))
+            trials += [
+                Trial(scenario, name, scene.seed, push_metrics(trace, of_calm, scene))
+                for scene, trace, of_calm in zip(scenes, pushed, calm, strict=True)
+            ]
+            if recorded:
+                trace = pushed[0].copy()
+                trace["error"][:, :3] = calm[0]["position"] - trace["position"]
+                recordings.append(Recording(scenario, name, seeds[0], trace))
+            if progress:
+                progress(len(scenes))
+        worlds.close()
+    return trials, recordings
+
+
+def run_pushed(worlds: Worlds, scenes: Sequence[PushedMotion], with_push: bool) -> list[np.ndarray]:
+    """Play scenes in their worlds, from the beginning, with their noise, and with their push or without.
+
+    Returns:
+        One array of `trace_dtype` records for each, one a ms.
     """
-    motions = [sample_motion(arm, seed) for seed in seeds]
-    rngs = [scene_rng(seed, 2 if scenario == STEP else 3) for seed in seeds]
-    onsets = [round(POLICY_RATE_HZ * rng.uniform(0.3, m.meets_s)) for rng, m in zip(rngs, motions, strict=True)]
-    worlds = Worlds(arm, [motion.world((), real=True) for motion in motions], controller, len(motions), seeds)
-    play, steps = Playback(worlds, motions), np.zeros((len(motions), MAX_TICKS), dtype=trace_dtype(arm.n))
-    pushes: dict[int, Push] = {}
-    pieces: list[list[np.ndarray]] = [[] for _ in motions]
-    for step in range(max(onsets) + _AFTER_STEPS):
-        for i in (i for i, onset in enumerate(onsets) if onset == step):
-            pushes[i] = push = sample_push(arm, worlds.datas[i].qpos[: arm.n], rngs[i], scenario)
-            now = play.ticks / 1000.0
-            worlds.push(i, f"link{push.link}", push.point, push.force, now, now + 1.0, ramp_s=0.001)
-        ticks = play.step(steps)
-        for i, onset in enumerate(onsets):
-            if onset <= step < onset + _AFTER_STEPS:
-                pieces[i].append(steps[i, :ticks].copy())
-    worlds.close()
-    measure = step_metrics if scenario == STEP else contact_metrics
-    return [Trial(scenario, name, seed, measure(np.concatenate(pieces[i]), pushes[i])) for i, seed in enumerate(seeds)]
+    worlds.seed([scene.seed for scene in scenes])
+    play = Playback(worlds, scenes)
+    if with_push:
+        for i, scene in enumerate(scenes):
+            worlds.push(i, f"link{scene.link}", scene.point, scene.force, scene.meets_s, scene.release_s, scene.ramp_s)
+    return record_rest(play)
 
 
-def step_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
-    """Return how soon a step was reported; NaN where a contact was reported before it.
-
-    Args:
-        trace: `trace_dtype` records from the onset on, (T,).
-        push: what was done.
-    """
-    reported = trace["mode"] != FREE
-    after_ms = float(np.argmax(reported)) if reported.any() else math.nan
-    early = bool(reported[0])
-    return {
-        "link": float(push.link),
-        "force_n": float(np.linalg.norm(push.force)),
-        "reported_early": float(early),
-        "detect_ms": math.nan if early else after_ms,
-        "within_15_ms": math.nan if early else float(after_ms <= 15),
-        "within_30_ms": math.nan if early else float(after_ms <= 30),
-    }
-
-
-def contact_metrics(trace: np.ndarray, push: Push) -> dict[str, float]:
-    """Return which link was named `NAMED_AFTER_MS` after the onset; arguments as for `step_metrics`."""
-    named = int(trace["link"][NAMED_AFTER_MS])
-    early = bool(trace["mode"][0] != FREE)
-    return {
-        "link": float(push.link),
-        "force_n": float(np.linalg.norm(push.force)),
-        "reported_early": float(early),
-        "link_named": math.nan if early else float(named),
-        "link_right": math.nan if early else float(named == push.link),
-        "own_torque_nm": float(abs(push.torque[push.link - 1])),
-    }
+def compared(trials: Sequence[Trial], baseline: str) -> tuple[Trial, ...]:
+    """Add to each trial how its displacement compares with the baseline's in the same trial; see `against`."""
+    before = {(t.scenario, t.seed): t.metrics for t in trials if t.controller == baseline}
+    return tuple(replace(t, metrics=t.metrics | against(t.metrics, before[t.scenario, t.seed])) for t in trials)

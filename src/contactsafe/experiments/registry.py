@@ -8,6 +8,8 @@ from contactsafe.experiments import (
     detection,
     disturbance,
     joint_safety,
+    localisation,
+    pushes,
     task_safety,
 )
 from contactsafe.experiments.config import Entry
@@ -23,6 +25,8 @@ ENTRIES: dict[str, Entry] = {
         disturbance.ENTRY,
         collisions.ENTRY,
         detection.ENTRY,
+        pushes.ENTRY,
+        localisation.ENTRY,
         adversarial.ENTRY,
         clock.ENTRY,
     )

@@ -5,6 +5,8 @@ import numpy as np
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import arm_capsules
 
+_TOUCHING_M = 1e-6  # rounding: a point of the surface is this far within it at most
+
 
 def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Sample a point of a link's capsules and the outward normal there, in the link's frame, (3,) m and (3,)."""
@@ -32,3 +34,17 @@ def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:
     fraction = np.einsum("fki,fki->fk", point - starts, along) / np.einsum("fki,fki->fk", along, along)
     nearest = starts + np.clip(fraction, 0.0, 1.0)[..., None] * along
     return float((np.linalg.norm(point - nearest, axis=2) - radii).min())
+
+
+def is_uncovered(arm: Arm, q: np.ndarray, place: np.ndarray, inwards: np.ndarray) -> bool:
+    """Tell whether a point of a link's surface can be touched: no other link covers it or is right before it.
+
+    Args:
+        arm: built from a description.
+        q: its joint positions, (n,), rad.
+        place: of the point, world, (3,), m.
+        inwards: opposite of the outward normal there, world, (3,).
+    """
+    if clearance(arm, q[None], place) < -_TOUCHING_M:
+        return False
+    return clearance(arm, q[None], place - 1e-3 * inwards) >= 0.5e-3

@@ -32,10 +32,14 @@ def touchable(links: np.ndarray, tool: Tool | None) -> np.ndarray:
     return np.concatenate([links, _of_tool(tool)])
 
 
-def capsule_places(description: ArmDescription) -> np.ndarray:
+def capsule_places(description: ArmDescription, count: int = POINTS) -> np.ndarray:
     """Spread some 480 points over the capsules of an arm's links, as many per area everywhere, (P, 7).
 
     Link 1 is left out as in `capsule_surface`. On a Panda the points are 3 cm apart.
+
+    Args:
+        description: the arm.
+        count: how many points, at most `_DENSE_M2` on a square metre.
     """
     rng = np.random.default_rng(0)
     dense = {
@@ -45,8 +49,7 @@ def capsule_places(description: ArmDescription) -> np.ndarray:
     }
     total = sum(len(points) for points in dense.values())
     rows = [
-        np.insert(spread(points, round(POINTS * len(points) / total)), 0, link, axis=1)
-        for link, points in dense.items()
+        np.insert(spread(points, round(count * len(points) / total)), 0, link, axis=1) for link, points in dense.items()
     ]
     return np.concatenate([np.zeros((0, SURFACE_COLUMNS)), *rows])
 

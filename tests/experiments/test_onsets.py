@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contactsafe.experiments.pushes import CONTACT, FORCE_N, STEP, point_torque, pushed_links, sample_push
+from contactsafe.experiments.onsets import CONTACT, FORCE_N, STEP, point_torque, pushed_links, sample_push
 from contactsafe.experiments.surfaces import clearance
 from contactsafe.robot import robots
 from contactsafe.robot.arm import description_and_tool
