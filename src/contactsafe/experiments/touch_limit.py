@@ -69,7 +69,7 @@ class Surface:
         return points, np.einsum("pij,pj->pi", rotations[self.links], self.rows[:, 4:])
 
     def refined(self, chosen: np.ndarray) -> "Surface":
-        """Return a finer grid about some of the points, indices (K,): `_FINE`² points in place of each, in its order.
+        """Return a finer grid about some of the points, indices (K,): `_FINE` squared in place of each, in its order.
 
         They lie in the plane that touches the surface at their point, from which it is a fraction of a millimetre away.
         """
