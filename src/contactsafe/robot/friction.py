@@ -1,4 +1,4 @@
-"""Joint friction of Gaz et al. 2019: a smooth step in velocity."""
+"""Joint friction: the smooth step in velocity of Gaz et al. 2019, and what is viscous or constant beside it."""
 
 import math
 
@@ -29,3 +29,25 @@ def joint_friction_into(parameters: Matrix, qd: Vector, out: Vector) -> Vector:
         phi1, phi2, phi3 = parameters[i, 0], parameters[i, 1], parameters[i, 2]
         out[i] = phi1 / (1.0 + math.exp(-phi2 * (qd[i] + phi3))) - phi1 / (1.0 + math.exp(-phi2 * phi3))
     return out
+
+
+@compiled
+def joint_drag_into(friction: Matrix, drag: Matrix, qd: Vector, out: Vector) -> Vector:
+    """Fill all torque that is lost at each joint, and give it back: the smooth step, viscous friction and a constant.
+
+    Args:
+        friction: φ1 N m, φ2 s/rad, φ3 rad/s, (n, 3).
+        drag: viscous friction N m s/rad and constant torque N m, (n, 2). Zeros change no bit.
+        qd: joint velocity, (n,), rad/s.
+        out: torque, (n,), N m.
+    """
+    joint_friction_into(friction, qd, out)
+    for i in range(qd.shape[0]):
+        out[i] += drag[i, 0] * qd[i] + drag[i, 1]
+    return out
+
+
+@compiled
+def joint_drag(friction: Matrix, drag: Matrix, qd: Vector) -> Vector:
+    """Return all torque that is lost at each joint, (n,), N m; see `joint_drag_into`."""
+    return joint_drag_into(friction, drag, qd, np.empty(qd.shape[0]))

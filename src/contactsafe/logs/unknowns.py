@@ -1,0 +1,112 @@
+"""What identification looks for, as columns of a least-squares problem, and what is known of it beforehand.
+
+Torque that does not reach the links, or that a sensor shows beside what does, is of one form for each joint:
+Coulomb · step(q̇) + viscous · q̇ + bias, with the step of `contactsafe.logs.impulses.friction_step`. Priors are wide
+where a command is logged, and centred on the arm's published friction; behind the gears there is little of it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactsafe.logs.impulses import Impulses
+from contactsafe.logs.least_squares import Problem
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.regressor import PARAMETERS
+
+SHARP = (40.0, 0.0)
+"""φ2, s/rad, and φ3, rad/s, of Coulomb friction that is fully there at 0.05 rad/s."""
+
+_STEEP = (5.0, 12.0, 120.0, 400.0)
+"""Others that are tried, s/rad."""
+
+_COMMANDED = {"bias": 0.05, "viscous": 0.05, "coulomb": 0.1}
+_MEASURED = {"bias": 0.005, "viscous": 0.003, "coulomb": 0.01}
+"""Standard deviations beforehand as fractions of the torque limit; viscous at 1 rad/s. A torque sensor's bias is small
+beside its hysteresis, which looks like friction."""
+
+_ROTOR = 0.3
+"""Of a rotor's inertia, as a fraction of the largest that the links have about that joint, plus all of the nominal."""
+
+_LOAD_KG = 0.06
+"""Of the payload's mass, kg per N m of the strongest joint: 5 kg for a Panda."""
+
+_LOAD_AT_M = 0.2
+"""How far from the last link's frame a load usually is."""
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Which unknowns a problem has, each of the joints' one after the other.
+
+    Attributes:
+        n: number of joints.
+        behind_gears: whether the torque was measured behind the gears: then no rotor is among them.
+        load: whether a payload is.
+    """
+
+    n: int
+    behind_gears: bool
+    load: bool
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of what each joint has."""
+        return ("bias", "viscous", "coulomb") if self.behind_gears else ("bias", "viscous", "coulomb", "rotor")
+
+    def of(self, name: str) -> slice:
+        """Return where something stands: one of `joints`, or 'load'."""
+        first = self.n * (len(self.joints) if name == "load" else self.joints.index(name))
+        return slice(first, first + (PARAMETERS if name == "load" else self.n))
+
+
+def shapes_of(arm: Arm, behind_gears: bool) -> tuple[np.ndarray, ...]:
+    """Return the shapes of friction to compare, (n, 2) each; the first is the one that is believed."""
+    sharp = np.tile(SHARP, (arm.n, 1))
+    if behind_gears:
+        return (sharp,)
+    published = np.where(arm.friction[:, :1] > 0.0, arm.friction[:, 1:], sharp)
+    return published, sharp, *(np.tile((steep, 0.0), (arm.n, 1)) for steep in _STEEP)
+
+
+def problem_of(arm: Arm, unknowns: Unknowns, impulses: Impulses, shape: np.ndarray) -> Problem:
+    """Return the problem for one choice of friction shapes.
+
+    Args:
+        arm: whose published numbers are the prior's mean.
+        unknowns: which.
+        impulses: N windows.
+        shape: which of the shapes each joint has, (n,).
+    """
+    n, step = unknowns.n, np.stack(impulses.steps)
+    chosen = step[shape, :, np.arange(n)].T
+    signals = {"bias": np.ones_like(chosen), "viscous": impulses.speed, "coulomb": chosen}
+    signals["rotor"] = impulses.acceleration
+    columns = [signals[name][:, :, None] * np.eye(n) for name in unknowns.joints]
+    spreads = _MEASURED if unknowns.behind_gears else _COMMANDED
+    mean, spread = [], []
+    for name in unknowns.joints:
+        mean.append(_published(arm, name, unknowns.behind_gears))
+        spread.append(_rotor_spread(arm) if name == "rotor" else spreads[name] * arm.tau_max)
+    if unknowns.load:
+        columns.append(impulses.load)
+        mean.append(np.zeros(PARAMETERS))
+        spread.append(_load_spread(arm))
+    return Problem(np.concatenate(columns, axis=2), impulses.driving, np.concatenate(mean), np.concatenate(spread))
+
+
+def _published(arm: Arm, name: str, behind_gears: bool) -> np.ndarray:
+    if behind_gears or name == "bias":
+        return np.zeros(arm.n)
+    published = {"viscous": np.zeros(arm.n), "coulomb": 0.5 * arm.friction[:, 0], "rotor": arm.model.dof_armature}
+    return np.array(published[name])
+
+
+def _rotor_spread(arm: Arm) -> np.ndarray:
+    inertia = np.diag(arm.dynamics(arm.home, np.zeros(arm.n))["M"])
+    return np.array(arm.model.dof_armature + _ROTOR * inertia)
+
+
+def _load_spread(arm: Arm) -> np.ndarray:
+    kg = _LOAD_KG * float(arm.tau_max.max())
+    return kg * np.repeat([1.0, _LOAD_AT_M, _LOAD_AT_M**2], [1, 3, 6])
