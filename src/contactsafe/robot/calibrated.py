@@ -1,6 +1,7 @@
 """An arm with what was identified of it: friction, rotors, payload, sensors."""
 
 import copy
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,6 +55,17 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
         sensor_drag=arm.sensor_drag if sensor is None else sensor.drag,
         description=_described(arm, model, friction, load),
     )
+
+
+def arm_for(given: Arm | Calibration | None, usual: Callable[[], Arm]) -> Arm:
+    """Return the arm that was given; the usual one where none was, as calibrated where a calibration was.
+
+    Raises:
+        InvalidInputError: that is no arm, or the calibration of another robot.
+    """
+    if isinstance(given, Calibration):
+        return calibrated(usual(), given)
+    return usual() if given is None else require_arm(given)
 
 
 def tool_name(arm: Arm) -> str:

@@ -9,10 +9,12 @@ from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import FLANGE, HAND, WIPER
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.user_mjcf import from_mjcf
+from contactsafe.robot.user_urdf import from_urdf
 from contactsafe.robot.wrist import WristNames
 
 __all__ = [
-    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf", "panda",
+    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf", "from_urdf",
+    "panda",
 ]  # fmt: skip
 
 TOOLS = {"flange": FLANGE, "hand": HAND, "wiper": WIPER}
