@@ -17,6 +17,9 @@ from contactsafe.robot.regressor import link_regressor, motion_of, nominal_terms
 WINDOW_S = 0.1
 """Long enough that the noise of velocity at its ends is little, short against a motion's period."""
 
+SLOW_RAD_S = 0.02
+"""Below, a joint may stick, and friction is whatever holds it."""
+
 _ROWS = 4000
 """Of which the regressors are in memory at a time."""
 
@@ -30,6 +33,7 @@ class Impulses(NamedTuple):
         speed: mean velocity, (N, n), rad/s.
         acceleration: mean acceleration, (N, n), rad/s².
         steps: mean of the step of each friction shape, one each, (N, n).
+        moving: whether the joint moved in one direction fast enough for its friction to be known, (N, n).
         load: per inertial parameter of what the last link carries, (N, n, 10).
     """
 
@@ -37,13 +41,14 @@ class Impulses(NamedTuple):
     driving: np.ndarray
     speed: np.ndarray
     acceleration: np.ndarray
+    moving: np.ndarray
     steps: tuple[np.ndarray, ...]
     load: np.ndarray
 
     def part(self, which: np.ndarray | slice) -> "Impulses":
         """Return some of the windows."""
         steps = tuple(step[which] for step in self.steps)
-        return Impulses(*(values[which] for values in self[:4]), steps, self.load[which])
+        return Impulses(*(values[which] for values in self[:5]), steps, self.load[which])
 
 
 def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np.ndarray, ...]) -> Impulses:
@@ -70,12 +75,13 @@ def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np
                 rate * (_windows(torque[part] - beta, rows, step) - np.diff(p[::rows], axis=0)),
                 rate * _windows(qd, rows, step),
                 rate * np.diff(qd[::rows], axis=0),
+                _moving(qd, rows),
                 tuple(rate * _windows(friction_step(shape, qd), rows, step) for shape in shapes),
                 rate * (_windows(beta_load, rows, step) + np.diff(p_load[::rows], axis=0)),
             ).part(whole)
         )
     steps = tuple(np.concatenate([one.steps[k] for one in found]) for k in range(len(shapes)))
-    first = (np.concatenate(parts) for parts in zip(*(one[:4] for one in found), strict=True))
+    first = (np.concatenate(parts) for parts in zip(*(one[:5] for one in found), strict=True))
     return Impulses(*first, steps, np.concatenate([one.load for one in found]))
 
 
@@ -96,6 +102,11 @@ def _parts(count: int, rows: int) -> Iterator[slice]:
     for first in range(0, windows, many):
         last = min(first + many, windows)
         yield slice(first * rows, last * rows + 1)
+
+
+def _moving(qd: np.ndarray, rows: int) -> np.ndarray:
+    slow = np.abs(qd[:-1]) < SLOW_RAD_S
+    return ~slow.reshape(-1, rows, qd.shape[1]).any(axis=1)
 
 
 def _windows(values: np.ndarray, rows: int, step: float) -> np.ndarray:

@@ -22,16 +22,18 @@ class Problem(NamedTuple):
         torque: (N, n), N m.
         mean: of the unknowns beforehand, (P,).
         spread: of them, standard deviation, (P,).
+        counts: which torques do, (N, n).
     """
 
     columns: np.ndarray
     torque: np.ndarray
     mean: np.ndarray
     spread: np.ndarray
+    counts: np.ndarray
 
     def part(self, which: np.ndarray | slice) -> "Problem":
         """Return some of the rows."""
-        return self._replace(columns=self.columns[which], torque=self.torque[which])
+        return self._replace(columns=self.columns[which], torque=self.torque[which], counts=self.counts[which])
 
 
 class Solution(NamedTuple):
@@ -56,15 +58,18 @@ def solve(problem: Problem) -> Solution:
     """
     columns, torque = problem.columns, problem.torque
     off = torque - columns @ problem.mean
-    sigma, trust = np.maximum(off.std(axis=0), _LEAST_NM), np.ones_like(torque)
+    counts, many = problem.counts, np.maximum(problem.counts.sum(axis=0), 1)
+    sigma, trust = np.maximum(off.std(axis=0), _LEAST_NM), counts.astype(float)
     for _ in range(_ROUNDS):
         weighted = columns * (trust / sigma**2)[:, :, None]
         curvature = np.einsum("tia,tib->ab", weighted, columns) + np.diag(problem.spread**-2.0)
         change = _solve_scaled(curvature, np.einsum("tia,ti->a", weighted, off), problem.spread)
         residual = off - columns @ change
-        robust = np.maximum(1.4826 * np.median(np.abs(residual), axis=0), _LEAST_NM)
-        trust = np.minimum(1.0, _HUBER * robust / np.maximum(np.abs(residual), _LEAST_NM))
-        sigma = np.maximum(np.sqrt(np.mean(trust * residual**2, axis=0) * _inflation(residual)), _LEAST_NM)
+        size = np.where(counts, np.abs(residual), np.nan)
+        robust = np.maximum(1.4826 * np.nanmedian(size, axis=0), _LEAST_NM)
+        trust = np.where(counts, np.minimum(1.0, _HUBER * robust / np.maximum(np.abs(residual), _LEAST_NM)), 0.0)
+        variance = np.sum(trust * residual**2, axis=0) / many * _inflation(np.where(counts, residual, 0.0))
+        sigma = np.maximum(np.sqrt(variance), _LEAST_NM)
     covariance = _solve_scaled(curvature, np.eye(len(change)), problem.spread)
     return Solution(problem.mean + change, covariance, residual)
 

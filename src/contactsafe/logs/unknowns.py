@@ -25,6 +25,9 @@ _MEASURED = {"bias": 0.005, "viscous": 0.003, "coulomb": 0.01}
 """Standard deviations beforehand as fractions of the torque limit; viscous at 1 rad/s. A torque sensor's bias is small
 beside its hysteresis, which looks like friction."""
 
+_LEAST_MOVING = 0.2
+"""Fraction of windows in which a joint moves, below which it moves so little that all of them count."""
+
 _ROTOR = 0.3
 """Of a rotor's inertia, as a fraction of the largest that the links have about that joint, plus all of the nominal."""
 
@@ -92,7 +95,20 @@ def problem_of(arm: Arm, unknowns: Unknowns, impulses: Impulses, shape: np.ndarr
         columns.append(impulses.load)
         mean.append(np.zeros(PARAMETERS))
         spread.append(_load_spread(arm))
-    return Problem(np.concatenate(columns, axis=2), impulses.driving, np.concatenate(mean), np.concatenate(spread))
+    return Problem(
+        np.concatenate(columns, axis=2),
+        impulses.driving,
+        np.concatenate(mean),
+        np.concatenate(spread),
+        _counting(impulses.moving, unknowns.behind_gears),
+    )
+
+
+def _counting(moving: np.ndarray, behind_gears: bool) -> np.ndarray:
+    """Return which windows of a joint count: where commands are logged, those in which it does not stick."""
+    if behind_gears:
+        return np.ones_like(moving)
+    return moving | (moving.mean(axis=0) < _LEAST_MOVING)
 
 
 def _published(arm: Arm, name: str, behind_gears: bool) -> np.ndarray:

@@ -139,6 +139,17 @@ def parameters_of(inertia: Inertia) -> np.ndarray:
     return np.array([inertia.mass, *(inertia.mass * c), *moments])
 
 
+def site_in_link(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tool's frame in that of the last link: rotation (3, 3), and origin (3,), m."""
+    model = arm.model
+    site = model.site(arm.site).id
+    R, origin, body = quat_to_matrix(model.site_quat[site]), model.site_pos[site], int(model.site_bodyid[site])
+    while model.body_jntnum[body] == 0:
+        turn = quat_to_matrix(model.body_quat[body])
+        R, origin, body = turn @ R, model.body_pos[body] + turn @ origin, int(model.body_parentid[body])
+    return R, np.array(origin)
+
+
 def _base(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Return the frame that the first link's body is placed in."""
     origin, R, body = np.zeros(3), np.eye(3), int(model.body_parentid[model.jnt_bodyid[0]])
