@@ -52,7 +52,10 @@ class Clearance:
 
 
 def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Return the distance of segments a to b and c to d, (..., 3) each; Ericson, Real-Time Collision Detection, 5.1.9."""
+    """Return the distance of segments a to b and c to d, (..., 3) each.
+
+    Ericson, Real-Time Collision Detection, 5.1.9.
+    """
     u, v, r = b - a, d - c, a - c
     uu, vv, uv = np.sum(u * u, -1) + 1e-12, np.sum(v * v, -1) + 1e-12, np.sum(u * v, -1)
     ur, vr = np.sum(u * r, -1), np.sum(v * r, -1)

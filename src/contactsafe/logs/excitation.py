@@ -1,10 +1,13 @@
 """Exciting trajectories: motions of all joints that show friction, rotors and payload, within what the arm can do."""
 
+import io
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.files import write_whole
 from contactsafe.logs.clearance import Clearance
 from contactsafe.logs.impulses import impulses_of
 from contactsafe.logs.smoothing import Signals
@@ -155,3 +158,17 @@ def _condition(arm: Arm, q: np.ndarray, qd: np.ndarray) -> float:
     problem = problem_of(arm, Unknowns(arm.n, False, True), impulses, np.zeros(arm.n, dtype=int))
     columns = problem.columns * problem.spread / arm.tau_max[:, None]
     return float(np.linalg.cond(columns.reshape(-1, columns.shape[2])))
+
+
+def write_trajectory(path: Path, motion: Trajectory) -> None:
+    """Write a trajectory as CSV: time, q_0 …, qd_0 …, whole or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    n = motion.q.shape[1]
+    text = io.StringIO()
+    header = ",".join(["time", *(f"q_{i}" for i in range(n)), *(f"qd_{i}" for i in range(n))])
+    rows = np.hstack([motion.time[:, None], motion.q, motion.qd])
+    np.savetxt(text, rows, delimiter=",", fmt="%.9g", header=header, comments="")
+    write_whole(path, text.getvalue().encode())

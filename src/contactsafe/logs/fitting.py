@@ -65,9 +65,7 @@ class Fit:
         return Losses(bias, np.maximum(viscous, 0.0), np.maximum(coulomb, 0.0), *self.shapes.T.copy())
 
 
-def fit(
-    arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carried: np.ndarray | None = None
-) -> Fit:
+def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carried: np.ndarray | None = None) -> Fit:
     """Fit a log.
 
     A payload is looked for where it makes each half of the log predict the other one better.

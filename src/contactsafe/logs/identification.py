@@ -73,19 +73,25 @@ class Identification:
         """Whether the description leaves next to nothing."""
         return bool((self.before < _NOTHING * self.arm.tau_max).all())
 
-    def not_shown(self) -> tuple[str, ...]:
-        """Return what the log does not show, each in a few words with the reason."""
-        said = []
+    def not_shown(self, part: str) -> tuple[str, ...]:
+        """Return what a fit does not show, a few words a joint, with how the joint moved.
+
+        Args:
+            part: key of `fits`.
+        """
+        found, said = self.fits[part], []
         moved, fastest = np.ptp(self.signals.q, axis=0), np.abs(self.signals.qd).max(axis=0)
-        for part in self.fits.values():
-            for name in part.unknowns.joints:
-                where = part.unknowns.of(name)
-                spread = np.sqrt(np.diag(part.solution.covariance)[where]) / part.problem.spread[where]
-                pinned = part.problem.spread[where] < 1e-8
-                said += [
-                    f"{name} of joint {i + 1} (it moved by {moved[i]:.2g} rad, at most {fastest[i]:.2g} rad/s)"
-                    for i in np.flatnonzero((spread > _SHOWN) & ~pinned)
-                ]
+        left = {
+            name: found.deviation(name) / found.problem.spread[found.unknowns.of(name)]
+            for name in found.unknowns.joints
+        }
+        for i in range(self.arm.n):
+            names = [name for name, fraction in left.items() if fraction[i] > _SHOWN]
+            if names:
+                said.append(
+                    f"{', '.join(names)} of joint {i + 1}, which moved by {moved[i]:.2g} rad and at most "
+                    f"{fastest[i]:.2g} rad/s"
+                )
         return tuple(said)
 
     def verdict(self) -> str:

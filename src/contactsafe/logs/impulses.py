@@ -47,8 +47,15 @@ class Impulses(NamedTuple):
 
     def part(self, which: np.ndarray | slice) -> "Impulses":
         """Return some of the windows."""
-        steps = tuple(step[which] for step in self.steps)
-        return Impulses(*(values[which] for values in self[:5]), steps, self.load[which])
+        return Impulses(
+            self.time[which],
+            self.driving[which],
+            self.speed[which],
+            self.acceleration[which],
+            self.moving[which],
+            tuple(step[which] for step in self.steps),
+            self.load[which],
+        )
 
 
 def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np.ndarray, ...]) -> Impulses:
@@ -80,9 +87,15 @@ def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np
                 rate * (_windows(beta_load, rows, step) + np.diff(p_load[::rows], axis=0)),
             ).part(whole)
         )
-    steps = tuple(np.concatenate([one.steps[k] for one in found]) for k in range(len(shapes)))
-    first = (np.concatenate(parts) for parts in zip(*(one[:5] for one in found), strict=True))
-    return Impulses(*first, steps, np.concatenate([one.load for one in found]))
+    return Impulses(
+        np.concatenate([one.time for one in found]),
+        np.concatenate([one.driving for one in found]),
+        np.concatenate([one.speed for one in found]),
+        np.concatenate([one.acceleration for one in found]),
+        np.concatenate([one.moving for one in found]),
+        tuple(np.concatenate([one.steps[k] for one in found]) for k in range(len(shapes))),
+        np.concatenate([one.load for one in found]),
+    )
 
 
 def friction_step(shape: np.ndarray, qd: np.ndarray) -> np.ndarray:

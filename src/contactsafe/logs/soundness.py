@@ -33,7 +33,8 @@ def refuse_unfit(log: Log, arm: Arm) -> None:
         raise InvalidInputError(f"{log.source} has {1.0 / log.step_s:.3g} rows a second; record {low:g} or more")
     if log.seconds < LEAST_S:
         raise InvalidInputError(
-            f"{log.source} is {log.seconds:.2g} s long; record {LEAST_S:g} s or more, better 30, see `contactsafe record`"
+            f"{log.source} is {log.seconds:.2g} s long; record {LEAST_S:g} s or more, better 30, see "
+            "`contactsafe record`"
         )
     moved = np.ptp(log.q, axis=0)
     if moved.max() < _LEAST_RAD:
@@ -58,7 +59,7 @@ def refuse_contact(log: Log, arm: Arm, found: Fit) -> None:
     joint = int(np.argmax(np.where(lasting.any(axis=0), residual.max(axis=0) / arm.tau_max, 0.0)))
     rows, time = np.flatnonzero(lasting[:, joint]), found.impulses.time
     raise InvalidInputError(
-        f"{log.source}: something touches the arm from {time[rows[0]]:.2f} to {time[rows[-1] + 1]:.2f} s: the residual of "
-        f"joint {joint + 1} is {residual[rows, joint].max():.2g} N m there and {usual[joint]:.2g} N m elsewhere; record "
-        "free motion"
+        f"{log.source}: something touches the arm from {time[rows[0]]:.2f} to {time[rows[-1] + 1]:.2f} s: the residual "
+        f"of joint {joint + 1} is {residual[rows, joint].max():.2g} N m there and {usual[joint]:.2g} N m elsewhere; "
+        "record free motion"
     )

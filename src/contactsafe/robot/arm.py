@@ -98,16 +98,16 @@ class Arm(Independent):
     surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
-    drag: np.ndarray | None = None
-    sensor_friction: np.ndarray | None = None
-    sensor_drag: np.ndarray | None = None
+    drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
         if len(self.places) == 0:
             object.__setattr__(self, "places", touchable(self.surface, self.tool))
         for name, columns in (("drag", 2), ("sensor_friction", 3), ("sensor_drag", 2)):
-            if getattr(self, name) is None:
+            if np.size(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.zeros((self.n, columns)))
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)

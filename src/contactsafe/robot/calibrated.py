@@ -105,7 +105,8 @@ def _join(model: mujoco.MjModel, arm: Arm, load: Payload) -> None:
     found = _carrier(model, arm, load)
     if found is None:
         raise InvalidInputError(
-            f"the calibration's payload of {load.mass:.3g} kg leaves the last link of '{arm.name}' no body; identify anew"
+            f"the calibration's payload of {load.mass:.3g} kg leaves the last link of '{arm.name}' no body; "
+            "identify anew"
         )
     body, joined = found
     moments, axes = np.linalg.eigh(joined.matrix())

@@ -156,7 +156,9 @@ class Calibration:
         except (LookupError, TypeError, ValueError, OverflowError) as error:
             if isinstance(error, InvalidInputError):
                 raise
-            raise InvalidInputError(f"{path.name} is a damaged calibration: {shown(str(error))}; identify anew") from None
+            raise InvalidInputError(
+                f"{path.name} is a damaged calibration: {shown(str(error))}; identify anew"
+            ) from None
 
 
 _UNITS = {

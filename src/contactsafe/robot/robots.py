@@ -13,8 +13,8 @@ from contactsafe.robot.user_urdf import from_urdf
 from contactsafe.robot.wrist import WristNames
 
 __all__ = [
-    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf", "from_urdf",
-    "panda",
+    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf",
+    "from_urdf", "panda",
 ]  # fmt: skip
 
 TOOLS = {"flange": FLANGE, "hand": HAND, "wiper": WIPER}
