@@ -19,6 +19,9 @@ _PINNED = 1e-9
 _CLEARLY = 0.98
 """By this factor a friction shape must lessen a joint's residual to replace the one before it."""
 
+_CARRIES = 0.8
+"""By this factor a payload must lessen the squares of what is held out, or there is none."""
+
 _SIZE_M = 0.1
 """Radius of gyration of a load about its centre of mass, as far as nothing else is known."""
 
@@ -84,7 +87,8 @@ def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carr
     chosen = _choose_shapes(arm, Unknowns(arm.n, behind_gears, False), impulses)
     loads = (False, True) if carried is None else (False,)
     found = [_fit(arm, Unknowns(arm.n, behind_gears, load), impulses, chosen) for load in loads]
-    best = min(found, key=lambda one: _size(np.where(one[1].counts, one[2], 0.0), arm))
+    size = [_size(np.where(one[1].counts, one[2], 0.0), arm) for one in found]
+    best = found[-1] if size[-1] < _CARRIES * size[0] else found[0]
     if best[0].load:  # with the load known, friction shows better
         chosen = _choose_shapes(arm, best[0], impulses)
         best = _fit(arm, best[0], impulses, chosen)

@@ -11,7 +11,7 @@ from contactsafe.logs.smoothing import Signals, signals_of
 from contactsafe.logs.soundness import refuse_contact, refuse_unfit
 from contactsafe.logs.stiction import breakaway_torque
 from contactsafe.robot.arm import Arm, require_arm
-from contactsafe.robot.calibrated import last_link_with, tool_name
+from contactsafe.robot.calibrated import can_carry, tool_name
 from contactsafe.robot.calibration import Calibration
 from contactsafe.robot.payload import Payload
 from contactsafe.robot.regressor import site_in_link
@@ -173,7 +173,7 @@ def payload_of(found: Fit, arm: Arm) -> Payload | None:
     if np.linalg.norm(com) > _FAR_M:
         return None
     for one in (Payload(kg, com, inertia), Payload(kg, com, np.zeros((3, 3)))):
-        if last_link_with(arm, one) is not None and (kg < 0.0 or np.linalg.eigvalsh(one.inertia)[0] >= 0.0):
+        if can_carry(arm, one) and (kg < 0.0 or np.linalg.eigvalsh(one.inertia)[0] >= 0.0):
             return one
     return None
 

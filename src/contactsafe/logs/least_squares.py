@@ -59,19 +59,21 @@ def solve(problem: Problem) -> Solution:
     columns, torque = problem.columns, problem.torque
     off = torque - columns @ problem.mean
     counts, many = problem.counts, np.maximum(problem.counts.sum(axis=0), 1)
-    sigma, trust = np.maximum(off.std(axis=0), _LEAST_NM), counts.astype(float)
-    for _ in range(_ROUNDS):
-        weighted = columns * (trust / sigma**2)[:, :, None]
+    sigma, trust, correlated = np.maximum(off.std(axis=0), _LEAST_NM), counts.astype(float), np.ones(off.shape[1])
+    for k in range(_ROUNDS):
+        weighted = columns * (trust / (correlated * sigma**2))[:, :, None]
         curvature = np.einsum("tia,tib->ab", weighted, columns) + np.diag(problem.spread**-2.0)
         change = _solve_scaled(curvature, np.einsum("tia,ti->a", weighted, off), problem.spread)
+        if k == _ROUNDS - 1:
+            break
         residual = off - columns @ change
-        size = np.where(counts, np.abs(residual), np.nan)
-        robust = np.maximum(1.4826 * np.nanmedian(size, axis=0), _LEAST_NM)
+        robust = np.maximum(1.4826 * np.nanmedian(np.where(counts, np.abs(residual), np.nan), axis=0), _LEAST_NM)
         trust = np.where(counts, np.minimum(1.0, _HUBER * robust / np.maximum(np.abs(residual), _LEAST_NM)), 0.0)
-        variance = np.sum(trust * residual**2, axis=0) / many * _inflation(np.where(counts, residual, 0.0))
-        sigma = np.maximum(np.sqrt(variance), _LEAST_NM)
+        sigma = np.maximum(np.sqrt(np.sum(trust * residual**2, axis=0) / many), _LEAST_NM)
+        if k == _ROUNDS - 2:  # of the fit that has converged: what is not fitted yet is correlated anyhow
+            correlated = _inflation(np.where(counts, residual, 0.0))
     covariance = _solve_scaled(curvature, np.eye(len(change)), problem.spread)
-    return Solution(problem.mean + change, covariance, residual)
+    return Solution(problem.mean + change, covariance, off - columns @ change)
 
 
 def _solve_scaled(curvature: np.ndarray, right: np.ndarray, spread: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ from contactsafe.logs.log import Log
 _HALF_WIDTH_S = 0.02
 """Half the width of the cubic that is fitted about each row; of motion below 5 Hz it loses less than 1 %."""
 
-_GAP = 3.0
-"""Multiple of the usual time between two rows beyond which rows are missing."""
+_GAP, _GAP_S = 3.0, 0.01
+"""Multiple of the usual time between two rows, and time, beyond which rows are missing; less is bridged."""
 
 
 class Signals(NamedTuple):
@@ -41,8 +41,9 @@ def signals_of(log: Log) -> Signals:
     step = log.step_s
     time = np.arange(log.time[0], log.time[-1] + 0.5 * step, step)
     before = np.clip(np.searchsorted(log.time, time, side="right") - 1, 0, len(log.time) - 2)
-    whole = np.diff(log.time)[before] < _GAP * step
+    whole = np.diff(log.time)[before] < max(_GAP * step, _GAP_S)
     half = max(2, round(_HALF_WIDTH_S / step))
+    whole = np.convolve(~whole, np.ones(2 * half + 1), "same") < 0.5  # what is missing is smoothed into its neighbours
     value, slope = _kernels(half, step)
     q = _even(log.time, log.q, time)
     inner = slice(half, len(time) - half)

@@ -21,7 +21,7 @@ _STEEP = (5.0, 12.0, 120.0, 400.0)
 """Others that are tried, s/rad."""
 
 _COMMANDED = {"bias": 0.05, "viscous": 0.05, "coulomb": 0.1}
-_MEASURED = {"bias": 0.005, "viscous": 0.003, "coulomb": 0.01}
+_MEASURED = {"bias": 0.004, "viscous": 0.001, "coulomb": 0.01}
 """Standard deviations beforehand as fractions of the torque limit; viscous at 1 rad/s. A torque sensor's bias is small
 beside its hysteresis, which looks like friction."""
 

@@ -12,9 +12,9 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
 from contactsafe.robot.arm import Arm, require_arm
 from contactsafe.robot.calibration import Calibration
-from contactsafe.robot.description import ArmDescription, Inertia, Joint
+from contactsafe.robot.description import ArmDescription, Inertia, Tool
 from contactsafe.robot.payload import Payload
-from contactsafe.robot.regressor import inertia_in_body
+from contactsafe.robot.regressor import inertia_in_body, link_inertia, site_in_link
 
 
 def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
@@ -46,6 +46,7 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
     if load is not None:
         _join(model, arm, load)
     sensor = known.sensor
+    description, tool = _described(arm, model, friction, load)
     return replace(
         arm,
         model=model,
@@ -53,7 +54,8 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
         drag=drag,
         sensor_friction=arm.sensor_friction if sensor is None else sensor.friction,
         sensor_drag=arm.sensor_drag if sensor is None else sensor.drag,
-        description=_described(arm, model, friction, load),
+        description=description,
+        tool=tool,
     )
 
 
@@ -79,36 +81,43 @@ def is_body(inertia: Inertia) -> bool:
     return inertia.mass > 0.0 and moments[0] >= 0.0 and bool(moments[2] <= moments[0] + moments[1] + 1e-12)
 
 
-def last_link_with(arm: Arm, load: Payload) -> Inertia | None:
-    """Return the inertia that a body of the last link has with a payload, None where no body can have it."""
-    found = _carrier(arm.model, arm, load)
-    return None if found is None else found[1]
+def can_carry(arm: Arm, load: Payload) -> bool:
+    """Tell whether the last link with all it carries is still a body with a payload, whose mass may be negative."""
+    return _carrier(arm, load) is not None
 
 
-def _carrier(model: mujoco.MjModel, arm: Arm, load: Payload) -> tuple[int, Inertia] | None:
-    """Return which body takes a payload, and its inertia then: what carries the tool point, or the link itself."""
-    site = model.site(arm.site).id
-    R, origin, body = quat_to_matrix(model.site_quat[site]), model.site_pos[site].copy(), int(model.site_bodyid[site])
-    while True:
-        own = inertia_in_body(model, body)
-        if own.mass + load.mass > 0.0:
-            joined = own + Inertia.of(load.mass, origin + R @ load.com, R @ load.inertia @ R.T)
-            if is_body(joined):
-                return body, joined
-        if model.body_jntnum[body] > 0:
-            return None
-        turn = quat_to_matrix(model.body_quat[body])
-        R, origin, body = turn @ R, model.body_pos[body] + turn @ origin, int(model.body_parentid[body])
+def _carrier(arm: Arm, load: Payload) -> tuple[int, Inertia] | None:
+    """Return which body takes a payload, and its inertia then.
+
+    That is what carries the tool point; where it would be no body, the last link with all that is fixed to it.
+    """
+    model, site = arm.model, arm.model.site(arm.site).id
+    body, last = int(model.site_bodyid[site]), int(model.jnt_bodyid[arm.n - 1])
+    joined = _joined(inertia_in_body(model, body), load, quat_to_matrix(model.site_quat[site]), model.site_pos[site])
+    if joined is None:
+        body, joined = last, _joined(link_inertia(arm, arm.n), load, *site_in_link(arm))
+    return None if joined is None else (body, joined)
+
+
+def _joined(own: Inertia, load: Payload, R: np.ndarray, origin: np.ndarray) -> Inertia | None:
+    """Return a body with a payload whose frame has R and an origin in the body's; None where no body is so."""
+    if own.mass + load.mass <= 0.0:
+        return None
+    joined = own + Inertia.of(load.mass, origin + R @ load.com, R @ load.inertia @ R.T)
+    return joined if is_body(joined) else None
 
 
 def _join(model: mujoco.MjModel, arm: Arm, load: Payload) -> None:
-    found = _carrier(model, arm, load)
+    found = _carrier(arm, load)
     if found is None:
         raise InvalidInputError(
             f"the calibration's payload of {load.mass:.3g} kg leaves the last link of '{arm.name}' no body; "
             "identify anew"
         )
     body, joined = found
+    if body != model.site_bodyid[model.site(arm.site).id]:  # it has taken up the others
+        others = np.flatnonzero(model.body_weldid == body)
+        model.body_mass[others], model.body_inertia[others] = 0.0, 0.0
     moments, axes = np.linalg.eigh(joined.matrix())
     axes[:, 2] *= np.linalg.det(axes)  # a rotation, not a mirror
     model.body_mass[body], model.body_ipos[body] = joined.mass, joined.com
@@ -117,24 +126,25 @@ def _join(model: mujoco.MjModel, arm: Arm, load: Payload) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def _described(arm: Arm, model: mujoco.MjModel, friction: np.ndarray, load: Payload | None) -> ArmDescription | None:
-    """Return the description that simulated worlds build this arm from."""
-    description = arm.description
-    if description is None:
-        return None
+def _described(
+    arm: Arm, model: mujoco.MjModel, friction: np.ndarray, load: Payload | None
+) -> tuple[ArmDescription | None, Tool | None]:
+    """Return the description and the tool that simulated worlds build this arm from."""
+    description, tool = arm.description, arm.tool
+    if description is None or tool is None:
+        return description, tool
     links = []
     for link, phi, rotor in zip(description.links, friction, model.dof_armature, strict=True):
-        old = link.joint
         phi1, phi2, phi3 = (float(value) for value in phi)
-        joint = Joint(old.q_min, old.q_max, old.qd_max, old.tau_max, (phi1, phi2, phi3), float(rotor))
-        links.append(replace(link, joint=joint))
+        links.append(replace(link, joint=replace(link.joint, friction=(phi1, phi2, phi3), armature=float(rotor))))
     if load is not None:
-        links[-1] = replace(links[-1], inertia=links[-1].inertia + _at_last_link(arm, description, load))
-    return replace(description, links=tuple(links))
-
-
-def _at_last_link(arm: Arm, description: ArmDescription, load: Payload) -> Inertia:
-    R = quat_to_matrix(np.array(description.mount_quat))
-    tcp = np.zeros(3) if arm.tool is None else np.array(arm.tool.tcp)
-    com = np.array(description.mount_position) + R @ (tcp + load.com)
-    return Inertia.of(load.mass, com, R @ load.inertia @ R.T)
+        R, origin = quat_to_matrix(np.array(description.mount_quat)), np.array(description.mount_position)
+        at = origin + R @ np.array(tool.tcp)
+        joined = _joined(links[-1].inertia, load, R, at)
+        if joined is None:
+            carried = Payload(tool.inertia.mass, np.array(tool.inertia.com), tool.inertia.matrix())
+            with_tool = _joined(links[-1].inertia, carried, R, origin)
+            joined = None if with_tool is None else _joined(with_tool, load, R, at)
+            tool = replace(tool, inertia=Inertia(0.0, (0.0, 0.0, 0.0), (0.0,) * 6))
+        links[-1] = replace(links[-1], inertia=joined or links[-1].inertia)
+    return replace(description, links=tuple(links)), tool
