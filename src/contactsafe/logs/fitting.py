@@ -7,7 +7,7 @@ import numpy as np
 from contactsafe.logs.impulses import Impulses, impulses_of
 from contactsafe.logs.least_squares import Problem, Solution, solve
 from contactsafe.logs.smoothing import Signals
-from contactsafe.logs.unknowns import Unknowns, problem_of, shapes_of
+from contactsafe.logs.unknowns import SHARP, Unknowns, problem_of, shapes_of
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.calibration import Losses
 from contactsafe.robot.regressor import PARAMETERS
@@ -63,9 +63,13 @@ class Fit:
         return self.carried + (self.of("load") if self.unknowns.load else 0.0)
 
     def losses(self) -> Losses:
-        """Return what was found of each joint but its rotor."""
+        """Return what was found of each joint but its rotor.
+
+        Steps that are steeper are written as `SHARP`: a controller that compensates them would chatter at rest.
+        """
         bias, viscous, coulomb = (self.of(name).copy() for name in ("bias", "viscous", "coulomb"))
-        return Losses(bias, np.maximum(viscous, 0.0), np.maximum(coulomb, 0.0), *self.shapes.T.copy())
+        steep = np.minimum(self.shapes[:, 0], SHARP[0])
+        return Losses(bias, np.maximum(viscous, 0.0), np.maximum(coulomb, 0.0), steep, self.shapes[:, 1].copy())
 
 
 def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carried: np.ndarray | None = None) -> Fit:
