@@ -11,7 +11,7 @@ from contactsafe.cli import main
 from contactsafe.logs.excitation import excitation
 from contactsafe.robot.calibration import Calibration
 
-BIAS = np.array([0.6, -1.5, 0.5, -0.9, 0.3, 0.3, -0.2])
+BIAS = np.array([0.6, -4.0, 0.5, -3.0, 0.3, 0.3, -0.2])
 
 
 @pytest.fixture(scope="module")

@@ -96,10 +96,17 @@ def test_friction_of_the_published_form_keeps_its_shape(arm, motion):
     known = identify(free(log, torque=None), arm).calibration
     qd = np.linspace(-0.7, 0.7, 15)[:, None] * np.ones(7)
     expected = np.array([1.5 * joint_friction(arm.friction, row) for row in qd])
-    found = np.array([joint_friction(known.losses.friction, row) for row in qd]) + qd * known.losses.viscous
+    found = np.array([known.losses.at(row) for row in qd]) - known.losses.bias
     assert_allclose(found, expected, atol=0.05 * expected.max())
+    assert_allclose(known.losses.coulomb, 0.75 * arm.friction[:, 0], rtol=0.05, atol=0.02)
     assert_allclose(known.losses.bias, lost, rtol=0.05, atol=0.01)
     assert known.payload is None
+
+
+def test_dry_friction_beside_the_published_one_is_told_apart(arm, motion):
+    log = logged(arm, motion, friction=lambda qd: joint_friction(arm.friction, qd) + 0.5 * np.sign(qd))
+    known = identify(free(log, torque=None), arm).calibration
+    assert_allclose(known.losses.coulomb, 0.5 * arm.friction[:, 0] + 0.5, rtol=0.05)
 
 
 def test_six_joints_of_a_users_own_scene(tmp_path):

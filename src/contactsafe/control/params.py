@@ -61,7 +61,7 @@ def arm_dtype(n: int) -> np.dtype:
     return np.dtype(
         [(name, _f, (n,)) for name in ("q_min", "q_max", "qd_max", "tau_max", "runaway_speed", "reversal_s")]
         + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
-        + [("friction", _f, (n, 3)), ("drag", _f, (n, 2)), ("sensor_friction", _f, (n, 3)), ("sensor_drag", _f, (n, 2))]
+        + [("friction", _f, (n, 3)), ("drag", _f, (n, 3)), ("sensor_friction", _f, (n, 3)), ("sensor_drag", _f, (n, 3))]
         + [("sensor_errs", np.int64)]  # 1 where the sensors of torque show something beside it
         + [("rotor", _f, (n,)), ("lever_doubted", _f)]  # kg m², m
     )

@@ -153,9 +153,9 @@ def _condition(arm: Arm, q: np.ndarray, qd: np.ndarray) -> float:
     time = np.arange(len(q)) / _WEIGHED_HZ
     nothing = np.zeros(arm.n)
     signals = Signals(time, q, qd, None, qd, np.ones(len(time), dtype=bool), nothing, nothing)
-    shapes = shapes_of(arm, behind_gears=False)[:1]
+    shapes = shapes_of(arm, behind_gears=False)[:2]
     impulses = impulses_of(arm, signals, np.zeros_like(q), shapes)
-    problem = problem_of(arm, Unknowns(arm.n, False, True), impulses, np.zeros(arm.n, dtype=int))
+    problem = problem_of(arm, Unknowns(arm.n, False, False, True), impulses, np.ones(arm.n, dtype=int))
     columns = problem.columns * problem.spread / arm.tau_max[:, None]
     return float(np.linalg.cond(columns.reshape(-1, columns.shape[2])))
 

@@ -7,12 +7,13 @@ import numpy as np
 from contactsafe.logs.impulses import Impulses, impulses_of
 from contactsafe.logs.least_squares import Problem, Solution, solve
 from contactsafe.logs.smoothing import Signals
-from contactsafe.logs.unknowns import SHARP, Unknowns, problem_of, shapes_of
+from contactsafe.logs.unknowns import Unknowns, problem_of, shapes_of, unknowns_of
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.calibration import Losses
+from contactsafe.robot.friction import DRY_STEEP
 from contactsafe.robot.regressor import PARAMETERS
 
-_NOT_NEGATIVE = ("viscous", "coulomb", "rotor")
+_NOT_NEGATIVE = ("viscous", "coulomb", "smooth", "rotor")
 _PINNED = 1e-9
 """Of its spread, that is left to an unknown which would be negative."""
 
@@ -33,7 +34,8 @@ class Fit:
     Attributes:
         unknowns: which.
         impulses: of the log.
-        shapes: of friction, φ2 s/rad and φ3 rad/s, (n, 2).
+        shapes: of dry friction, φ2 s/rad and φ3 rad/s, (n, 2).
+        published: the arm's own, likewise.
         problem: with the priors that were in force.
         solution: of all windows.
         nominal: what the arm's own description leaves of every window, (N, n), N m.
@@ -44,6 +46,7 @@ class Fit:
     unknowns: Unknowns
     impulses: Impulses
     shapes: np.ndarray
+    published: np.ndarray
     problem: Problem
     solution: Solution
     nominal: np.ndarray
@@ -62,14 +65,32 @@ class Fit:
         """Return the inertial parameters of what is carried beside the description, (10,)."""
         return self.carried + (self.of("load") if self.unknowns.load else 0.0)
 
+    def found(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return values and standard deviations of one of `names`, (n,) each; smooth friction counts as coulomb."""
+        if name != "coulomb" or not self.unknowns.smooth:
+            return self.of(name), self.deviation(name)
+        dry, smooth, covariance = self.unknowns.of("coulomb"), self.unknowns.of("smooth"), self.solution.covariance
+        variance = np.diag(covariance[dry, dry] + covariance[smooth, smooth] + 2.0 * covariance[dry, smooth])
+        return self.of("coulomb") + self.of("smooth"), np.sqrt(np.maximum(variance, 0.0))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is told of each joint."""
+        return tuple(name for name in self.unknowns.joints if name != "smooth")
+
     def losses(self) -> Losses:
         """Return what was found of each joint but its rotor.
 
-        Steps that are steeper are written as `SHARP`: a controller that compensates them would chatter at rest.
+        Steps that are steeper than `DRY_STEEP` are written as that.
         """
-        bias, viscous, coulomb = (self.of(name).copy() for name in ("bias", "viscous", "coulomb"))
-        steep = np.minimum(self.shapes[:, 0], SHARP[0])
-        return Losses(bias, np.maximum(viscous, 0.0), np.maximum(coulomb, 0.0), steep, self.shapes[:, 1].copy())
+        bias, viscous, dry = (np.array(self.of(name)) for name in ("bias", "viscous", "coulomb"))
+        smooth, (steep, shift) = np.zeros_like(bias), self.published.T.copy()
+        if self.unknowns.smooth:
+            smooth = np.array(self.of("smooth"))
+        smoother = self.shapes[:, 0] < DRY_STEEP
+        smooth, dry = np.where(smoother, dry, smooth), np.where(smoother, 0.0, dry)
+        steep, shift = np.where(smoother, self.shapes[:, 0], steep), np.where(smoother, 0.0, shift)
+        return Losses(bias, *(np.maximum(values, 0.0) for values in (viscous, dry, smooth)), steep, shift)
 
 
 def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carried: np.ndarray | None = None) -> Fit:
@@ -88,9 +109,9 @@ def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carr
     impulses = impulses_of(arm, signals, torque, shapes)
     if carried is not None:
         impulses = impulses._replace(driving=impulses.driving - impulses.load @ carried)
-    chosen = _choose_shapes(arm, Unknowns(arm.n, behind_gears, False), impulses)
+    chosen = _choose_shapes(arm, unknowns_of(arm, behind_gears, False), impulses)
     loads = (False, True) if carried is None else (False,)
-    found = [_fit(arm, Unknowns(arm.n, behind_gears, load), impulses, chosen) for load in loads]
+    found = [_fit(arm, unknowns_of(arm, behind_gears, load), impulses, chosen) for load in loads]
     size = [_size(np.where(one[1].counts, one[2], 0.0), arm) for one in found]
     best = found[-1] if size[-1] < _CARRIES * size[0] else found[0]
     if best[0].load:  # with the load known, friction shows better
@@ -98,11 +119,12 @@ def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carr
         best = _fit(arm, best[0], impulses, chosen)
     unknowns, problem, check = best
     solution = _solve(unknowns, problem)
-    nominal = problem_of(arm, Unknowns(arm.n, behind_gears, False), impulses, np.zeros(arm.n, dtype=int))
+    nominal = problem_of(arm, unknowns_of(arm, behind_gears, False), impulses, np.ones(arm.n, dtype=int))
     return Fit(
         unknowns,
         impulses,
         np.stack(shapes)[chosen, np.arange(arm.n)],
+        shapes[0],
         problem,
         solution,
         nominal.torque - nominal.columns @ nominal.mean,
@@ -154,8 +176,8 @@ def _solve(unknowns: Unknowns, problem: Problem) -> Solution:
 
 def _choose_shapes(arm: Arm, unknowns: Unknowns, impulses: Impulses) -> np.ndarray:
     """Return for each joint the friction shape that leaves least, the first where none does clearly better, (n,)."""
-    chosen, least = np.zeros(arm.n, dtype=int), np.full(arm.n, np.inf)
-    for k in range(len(impulses.steps)):
+    chosen, least = np.ones(arm.n, dtype=int), np.full(arm.n, np.inf)
+    for k in range(1, len(impulses.steps)):
         shape = np.full(arm.n, k)
         problem = problem_of(arm, unknowns, impulses, shape)
         squares = np.where(problem.counts, _solve(unknowns, problem).residual ** 2, 0.0)

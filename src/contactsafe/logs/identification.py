@@ -81,10 +81,7 @@ class Identification:
         """
         found, said = self.fits[part], []
         moved, fastest = np.ptp(self.signals.q, axis=0), np.abs(self.signals.qd).max(axis=0)
-        left = {
-            name: found.deviation(name) / found.problem.spread[found.unknowns.of(name)]
-            for name in found.unknowns.joints
-        }
+        left = {name: found.found(name)[1] / found.problem.spread[found.unknowns.of(name)] for name in found.names}
         for i in range(self.arm.n):
             names = [name for name, fraction in left.items() if fraction[i] > _SHOWN]
             if names:

@@ -68,9 +68,9 @@ def _check(found: Identification) -> Table:
 
 def _joints(found: Identification, part: str) -> Table:
     fit: Fit = found.fits[part]
-    names = fit.unknowns.joints
-    values = {name: fit.of(name) for name in names}
-    intervals = {name: _CONFIDENCE * fit.deviation(name) for name in names}
+    names, found_of = fit.names, {name: fit.found(name) for name in fit.names}
+    values = {name: value for name, (value, _) in found_of.items()}
+    intervals = {name: _CONFIDENCE * deviation for name, (_, deviation) in found_of.items()}
     rows = []
     for i in range(found.arm.n):
         cells = [cell for name in names for cell in (float(values[name][i]), float(intervals[name][i]))]

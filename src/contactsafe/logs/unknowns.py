@@ -1,8 +1,9 @@
 """What identification looks for, as columns of a least-squares problem, and what is known of it beforehand.
 
 Torque that does not reach the links, or that a sensor shows beside what does, is of one form for each joint:
-Coulomb · step(q̇) + viscous · q̇ + bias, with the step of `contactsafe.logs.impulses.friction_step`. Priors are wide
-where a command is logged, and centred on the arm's published friction; behind the gears there is little of it.
+coulomb · step(q̇) + viscous · q̇ + bias, with the step of `contactsafe.logs.impulses.friction_step`, and of commands
+the arm's published step besides. Priors are wide where a command is logged, and centred on the arm's published
+friction; behind the gears there is little of it.
 """
 
 from dataclasses import dataclass
@@ -12,13 +13,11 @@ import numpy as np
 from contactsafe.logs.impulses import Impulses
 from contactsafe.logs.least_squares import Problem
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.friction import DRY_STEEP
 from contactsafe.robot.regressor import PARAMETERS
 
-SHARP = (40.0, 0.0)
-"""φ2, s/rad, and φ3, rad/s, of Coulomb friction that is fully there at 0.05 rad/s."""
-
-_STEEP = (5.0, 12.0, 120.0, 400.0)
-"""Others that are tried, s/rad."""
+_STEEPER, _SMOOTHER = (120.0, 400.0), (5.0, 12.0)
+"""Steps of dry friction that are tried beside `DRY_STEEP`, s/rad; smoother ones where no friction is published."""
 
 _COMMANDED = {"bias": 0.05, "viscous": 0.05, "coulomb": 0.1}
 _MEASURED = {"bias": 0.004, "viscous": 0.001, "coulomb": 0.01}
@@ -45,17 +44,20 @@ class Unknowns:
     Attributes:
         n: number of joints.
         behind_gears: whether the torque was measured behind the gears: then no rotor is among them.
+        smooth: whether friction of the published form is.
         load: whether a payload is.
     """
 
     n: int
     behind_gears: bool
+    smooth: bool
     load: bool
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of what each joint has."""
-        return ("bias", "viscous", "coulomb") if self.behind_gears else ("bias", "viscous", "coulomb", "rotor")
+        smooth = ("smooth",) if self.smooth else ()
+        return ("bias", "viscous", "coulomb", *smooth, *(() if self.behind_gears else ("rotor",)))
 
     def of(self, name: str) -> slice:
         """Return where something stands: one of `joints`, or 'load'."""
@@ -63,13 +65,15 @@ class Unknowns:
         return slice(first, first + (PARAMETERS if name == "load" else self.n))
 
 
+def unknowns_of(arm: Arm, behind_gears: bool, load: bool) -> Unknowns:
+    """Return what an arm's log is to show."""
+    return Unknowns(arm.n, behind_gears, not behind_gears and bool((arm.friction[:, 0] > 0.0).any()), load)
+
+
 def shapes_of(arm: Arm, behind_gears: bool) -> tuple[np.ndarray, ...]:
-    """Return the shapes of friction to compare, (n, 2) each; the first is the one that is believed."""
-    sharp = np.tile(SHARP, (arm.n, 1))
-    if behind_gears:
-        return (sharp,)
-    published = np.where(arm.friction[:, :1] > 0.0, arm.friction[:, 1:], sharp)
-    return published, sharp, *(np.tile((steep, 0.0), (arm.n, 1)) for steep in _STEEP)
+    """Return shapes of friction, (n, 2) each: the published one, then those of dry friction, the usual one first."""
+    more = () if behind_gears else _STEEPER if (arm.friction[:, 0] > 0.0).any() else (*_STEEPER, *_SMOOTHER)
+    return arm.friction[:, 1:], *(np.tile((steep, 0.0), (arm.n, 1)) for steep in (DRY_STEEP, *more))
 
 
 def problem_of(arm: Arm, unknowns: Unknowns, impulses: Impulses, shape: np.ndarray) -> Problem:
@@ -79,18 +83,19 @@ def problem_of(arm: Arm, unknowns: Unknowns, impulses: Impulses, shape: np.ndarr
         arm: whose published numbers are the prior's mean.
         unknowns: which.
         impulses: N windows.
-        shape: which of the shapes each joint has, (n,).
+        shape: which of the shapes the dry friction of each joint has, (n,).
     """
     n, step = unknowns.n, np.stack(impulses.steps)
     chosen = step[shape, :, np.arange(n)].T
     signals = {"bias": np.ones_like(chosen), "viscous": impulses.speed, "coulomb": chosen}
-    signals["rotor"] = impulses.acceleration
+    signals |= {"smooth": step[0], "rotor": impulses.acceleration}
     columns = [signals[name][:, :, None] * np.eye(n) for name in unknowns.joints]
     spreads = _MEASURED if unknowns.behind_gears else _COMMANDED
     mean, spread = [], []
     for name in unknowns.joints:
         mean.append(_published(arm, name, unknowns.behind_gears))
-        spread.append(_rotor_spread(arm) if name == "rotor" else spreads[name] * arm.tau_max)
+        of_their_own = {"rotor": _rotor_spread, "smooth": _smooth_spread}
+        spread.append(of_their_own[name](arm) if name in of_their_own else spreads[name] * arm.tau_max)
     if unknowns.load:
         columns.append(impulses.load)
         mean.append(np.zeros(PARAMETERS))
@@ -113,9 +118,13 @@ def _counting(moving: np.ndarray, behind_gears: bool) -> np.ndarray:
 
 def _published(arm: Arm, name: str, behind_gears: bool) -> np.ndarray:
     if behind_gears or name == "bias":
-        return np.zeros(arm.n)
-    published = {"viscous": np.zeros(arm.n), "coulomb": 0.5 * arm.friction[:, 0], "rotor": arm.model.dof_armature}
-    return np.array(published[name])
+        return np.zeros(arm.n)  # a constant that is known already is found anew
+    published = {"viscous": arm.drag[:, 0], "coulomb": arm.drag[:, 2], "smooth": 0.5 * arm.friction[:, 0]}
+    return np.array(arm.model.dof_armature if name == "rotor" else published[name])
+
+
+def _smooth_spread(arm: Arm) -> np.ndarray:
+    return np.maximum(0.5 * arm.friction[:, 0], 1e-3 * arm.tau_max)
 
 
 def _rotor_spread(arm: Arm) -> np.ndarray:

@@ -66,9 +66,9 @@ class Arm(Independent):
         torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
-        drag: viscous friction N m s/rad and constant torque N m that are lost beside `friction`, (n, 2).
+        drag: viscous friction N m s/rad, constant torque N m and dry friction N m beside `friction`, (n, 3).
         sensor_friction, sensor_drag: of the same form, what torque sensors behind the gears show beside the torque that
-            drives the links, (n, 3) and (n, 2): a bias, hysteresis. By default nothing.
+            drives the links, (n, 3) each: a bias, hysteresis. By default nothing.
         description: what the model was generated from, or for a user's own what was derived from it; None where
             nobody says.
         tool: what the flange carries; None likewise.
@@ -98,17 +98,17 @@ class Arm(Independent):
     surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
-    drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
         if len(self.places) == 0:
             object.__setattr__(self, "places", touchable(self.surface, self.tool))
-        for name, columns in (("drag", 2), ("sensor_friction", 3), ("sensor_drag", 2)):
+        for name in ("drag", "sensor_friction", "sensor_drag"):
             if np.size(getattr(self, name)) == 0:
-                object.__setattr__(self, name, np.zeros((self.n, columns)))
+                object.__setattr__(self, name, np.zeros((self.n, 3)))
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
         refuse_unsound(self)

@@ -10,6 +10,7 @@ import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.core.files import write_whole
+from contactsafe.robot.friction import joint_drag
 from contactsafe.robot.payload import Payload
 
 FORMAT = "contactsafe calibration 1"
@@ -22,31 +23,42 @@ _MOST = 1_000_000
 class Losses:
     """Torque of each joint that is lost, or shown beside what drives the links, as it depends on velocity.
 
-    Coulomb · (tanh(½ steep (q̇ + shift)) − tanh(½ steep shift)) + viscous · q̇ + bias.
+    bias + viscous · q̇ + dry · tanh(½ `DRY_STEEP` q̇) + smooth · (tanh(½ steep (q̇ + shift)) − tanh(½ steep shift)).
 
     Attributes:
         bias: at rest, (n,), N m.
         viscous: per velocity, (n,), N m s/rad.
-        coulomb: dry friction in motion, (n,), N m.
-        steep: how soon it is there, (n,), s/rad.
+        dry: dry friction in motion, (n,), N m.
+        smooth: friction of the published form, (n,), N m.
+        steep: how soon that is there, (n,), s/rad.
         shift: of its step, (n,), rad/s.
     """
 
     bias: np.ndarray
     viscous: np.ndarray
-    coulomb: np.ndarray
+    dry: np.ndarray
+    smooth: np.ndarray
     steep: np.ndarray
     shift: np.ndarray
 
     @property
+    def coulomb(self) -> np.ndarray:
+        """Return all friction but the viscous one, of a joint that is fast, (n,), N m."""
+        return self.dry + self.smooth
+
+    @property
     def friction(self) -> np.ndarray:
         """Return the smooth step as φ1, φ2, φ3 of `contactsafe.robot.friction`, (n, 3)."""
-        return np.stack([2.0 * self.coulomb, self.steep, self.shift], axis=1)
+        return np.stack([2.0 * self.smooth, self.steep, self.shift], axis=1)
 
     @property
     def drag(self) -> np.ndarray:
-        """Return what is viscous and what is constant, (n, 2)."""
-        return np.stack([self.viscous, self.bias], axis=1)
+        """Return what is viscous, constant and dry, as in `Arm.drag`, (n, 3)."""
+        return np.stack([self.viscous, self.bias, self.dry], axis=1)
+
+    def at(self, qd: np.ndarray) -> np.ndarray:
+        """Return the torque at joint velocities qd (n,), rad/s: (n,), N m."""
+        return joint_drag(self.friction, self.drag, qd)
 
 
 @dataclass(frozen=True)
@@ -162,7 +174,7 @@ class Calibration:
 
 
 _UNITS = {
-    "bias": "bias_nm", "viscous": "viscous_nm_s_rad", "coulomb": "coulomb_nm", "steep": "steep_s_rad",
+    "bias": "bias_nm", "viscous": "viscous_nm_s_rad", "dry": "dry_nm", "smooth": "smooth_nm", "steep": "steep_s_rad",
     "shift": "shift_rad_s",
 }  # fmt: skip
 

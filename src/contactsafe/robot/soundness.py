@@ -22,8 +22,8 @@ _TORQUE_RATES = (1e-6, 1e12)
 """N m/s; beyond, what is divided by one is no number."""
 
 _PER_JOINT = {
-    "q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": (), "drag": (2,),
-    "sensor_friction": (3,), "sensor_drag": (2,),
+    "q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": (), "drag": (3,),
+    "sensor_friction": (3,), "sensor_drag": (3,),
 }  # fmt: skip
 """What an arm has of every joint, and the shape of it."""
 
@@ -155,13 +155,15 @@ def _refuse_unsound_friction(arm, name: str) -> None:
 
 
 def _refuse_unsound_drag(arm, name: str) -> None:
-    """Refuse viscous friction that drives a joint, and a constant torque that no motor overcomes."""
-    for i, (viscous, constant) in enumerate(getattr(arm, name)):
+    """Refuse viscous and dry friction that drive a joint, and constants that no motor overcomes."""
+    for i, (viscous, constant, dry) in enumerate(getattr(arm, name)):
         most = arm.tau_max[i]
         if not 0.0 <= viscous < np.inf:
             raise InvalidInputError(f"{name}[{i}, 0] = {viscous:g} N m s/rad; give viscous friction from 0 on")
         if not abs(constant) <= most:
             raise InvalidInputError(f"{name}[{i}, 1] = {constant:g} N m; give a constant torque within ±{most:g}")
+        if not 0.0 <= dry <= most:
+            raise InvalidInputError(f"{name}[{i}, 2] = {dry:g} N m; give dry friction from 0 to {most:g}")
 
 
 def _listed(numbers) -> str:

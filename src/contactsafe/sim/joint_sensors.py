@@ -31,7 +31,7 @@ def joint_sensors_dtype(n: int) -> np.dtype:
             ("play", _f),  # half the width of the hysteresis, N m
             ("rotor", _f, (n,)),  # inertia before the sensor, kg m²
             ("friction", _f, (n, 3)),  # that is shown beside the torque: N m, s/rad, rad/s
-            ("drag", _f, (n, 2)),  # likewise, N m s/rad and N m
+            ("drag", _f, (n, 3)),  # likewise, N m s/rad, N m and N m
             ("torque_held", _f, (n,)),  # that the hysteresis shows, N m
             ("qd_before", _f, (n,)),  # of the plant a tick ago, rad/s
         ]

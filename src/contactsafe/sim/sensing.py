@@ -53,7 +53,7 @@ def errors_dtype(n: int) -> np.dtype:
             ("tool_com", _f, (3,)),  # mount frame, m
             ("tcp", _f, (3,)),  # mount frame, m
             ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
-            ("drag", _f, (n, 2)),  # viscous and constant beside it, N m s/rad, N m; already scaled
+            ("drag", _f, (n, 3)),  # viscous, constant and dry beside it, N m s/rad, N m; already scaled
             ("stiction", _f, (n,)),  # dry friction, N m
             ("bristle", _f, (n,)),  # how far it is taken up, −1 … 1
             ("joints", joint_sensors_dtype(n)),
@@ -86,7 +86,8 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     errors["friction"] = arm.friction
     errors["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
     errors["drag"] = arm.drag
-    errors["drag"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
+    for column in (0, 2):
+        errors["drag"][:, column] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
     errors["stiction"] = per_joint(config.plant.stiction_nm, arm.n, "stiction_nm")
     joints = errors["joints"]
     joints["band_sigma"] = sensors.velocity_band_rad_s * band_gain(tick_s)
