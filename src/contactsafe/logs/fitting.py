@@ -90,7 +90,8 @@ class Fit:
         smoother = self.shapes[:, 0] < DRY_STEEP
         smooth, dry = np.where(smoother, dry, smooth), np.where(smoother, 0.0, dry)
         steep, shift = np.where(smoother, self.shapes[:, 0], steep), np.where(smoother, 0.0, shift)
-        return Losses(bias, *(np.maximum(values, 0.0) for values in (viscous, dry, smooth)), steep, shift)
+        viscous, dry, smooth = (np.maximum(values, 0.0) for values in (viscous, dry, smooth))
+        return Losses(bias, viscous, dry, smooth, steep, shift)
 
 
 def fit(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool, carried: np.ndarray | None = None) -> Fit:
