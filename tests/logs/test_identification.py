@@ -198,3 +198,11 @@ def test_missing_rows_are_left_out(arm, log):
     thin = Log("gaps", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
     known = identify(thin, arm).calibration
     assert_allclose(known.sensor.bias, BIAS, rtol=0.05, atol=0.01)
+
+
+def test_a_joint_that_sticks_is_no_contact(arm, motion):
+    """At rest friction holds whatever is asked of it, up to its size: 1.5 N m at both ends of the motion."""
+    held = np.where(np.abs(motion.qd) < 1e-3, 1.5, 0.0)
+    log = logged(arm, motion, friction=lambda qd: 1.5 * np.sign(qd))
+    known = identify(free(log, torque=None, command=log.command + held * [1, 1, 1, 1, 0, 0, 0]), arm).calibration
+    assert_allclose(known.losses.coulomb, 1.5, rtol=0.05)

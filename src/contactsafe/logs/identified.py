@@ -91,7 +91,7 @@ def _load(found: Identification) -> tuple[Table, ...]:
         return ()
     spread = _CONFIDENCE * float(fit.deviation("load")[0])
     row = (load.mass, spread, *(float(value) for value in load.com), *(float(load.inertia[k, k]) for k in range(3)))
-    columns = ("mass (kg)", "± mass", "com x (m)", "y (m)", "z (m)", "Ixx (kg m²)", "Iyy", "Izz")
+    columns = ("mass (kg)", "± mass", "com x (m)", "com y (m)", "com z (m)", "Ixx (kg m²)", "Iyy", "Izz")
     note = "Carried beside what the description has, in the tool's frame; inertia about the centre of mass."
     return (Table("payload", "Payload", columns, (row,), note),)
 

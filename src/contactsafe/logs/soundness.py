@@ -50,8 +50,8 @@ def refuse_contact(log: Log, arm: Arm, found: Fit) -> None:
     Raises:
         InvalidInputError: with the time, from and to.
     """
-    residual = np.abs(found.solution.residual)
-    usual = 1.4826 * np.median(residual, axis=0)
+    residual = np.where(found.problem.counts, np.abs(found.solution.residual), 0.0)  # what holds a joint is no contact
+    usual = 1.4826 * np.nanmedian(np.where(found.problem.counts, residual, np.nan), axis=0)
     large = residual > np.maximum(_OUTLIER * usual, _LARGE * arm.tau_max)
     lasting = large[1:] & large[:-1]
     if not lasting.any():
