@@ -144,8 +144,8 @@ def _use(arm: Arm, time: np.ndarray, q: np.ndarray, qd: np.ndarray) -> np.ndarra
     used = np.maximum(used, np.abs(qd).max(axis=0) / fastest)
     p, beta = nominal_terms(arm, motion_of(arm, q, qd), qd, rotors=True)
     torque = np.abs(np.gradient(p, time, axis=0) + beta).max(axis=0)
-    holding = np.abs(arm.dynamics(arm.home, np.zeros(arm.n))["g"])
-    room_nm = np.maximum(_TORQUE * arm.tau_max, holding + 0.1 * arm.tau_max)
+    at_rest = np.abs(arm.dynamics(arm.home, np.zeros(arm.n))["g"])
+    room_nm = np.maximum(_TORQUE * arm.tau_max, at_rest + 0.1 * arm.tau_max)
     return np.maximum(used, np.where(torque > room_nm, 1.25, 0.0))
 
 

@@ -51,7 +51,7 @@ class Solution(NamedTuple):
 
 
 def solve(problem: Problem) -> Solution:
-    """Weigh each joint by its own noise, and what is known beforehand by its spread; x = argmin Σ w r² + ((x−m)/s)².
+    """Weight each joint by its own noise, and what is known beforehand by its spread; x = argmin Σ w r² + ((x−m)/s)².
 
     Residuals of neighbouring rows that are alike are fewer measurements than rows: with a correlation of ρ the
     variance of their mean is (1 + ρ)/(1 − ρ) times larger. Outliers count less (Huber).
