@@ -30,7 +30,7 @@ def test_a_log_of_a_motion_is_taken(arm):
         (swinging(0.3, joints=6), "a log has 6 joints, arm 'panda' has 7; give the right robot"),
         (swinging(0.3, rate_hz=30.0), "a log has 30 rows a second; record 50 or more"),
         (swinging(0.3, seconds=1.0), "record 2 s or more, better 30, see `contactsafe record`"),
-        (swinging(0.01), "is of an arm at rest: no joint moves by more than 0.02 rad"),
+        (swinging(0.01), "is of an arm at rest: no joint moves by more than 0.018 rad"),
     ],
 )
 def test_what_shows_nothing_is_refused_in_one_line(arm, log, text):
