@@ -147,7 +147,7 @@ def test_what_makes_no_sense_is_one_line(file, capsys, words, text):
 def test_help_says_what_a_log_needs(capsys):
     assert main(["replay", "--help"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "a CSV or NPZ file with time, q, and torque or command" in printed
+    assert "a CSV, NPZ or MCAP file with time, q, and torque or command" in printed
     assert "--columns" in printed
 
 

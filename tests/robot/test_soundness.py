@@ -176,3 +176,21 @@ def test_negative_masses_are_refused(panda, field):
     getattr(model, field)[-1] = -1.0
     with pytest.raises(InvalidInputError, match=f"^{field} of arm 'panda' has a negative number; mend the model$"):
         replace(panda, model=model)
+
+
+@pytest.mark.parametrize(
+    ("field", "index", "value", "text"),
+    [
+        ("drag", (1, 0), -1.0, "drag[1, 0] = -1 N m s/rad; give viscous friction from 0 on"),
+        ("drag", (1, 1), np.nan, "drag[1, 1] = nan N m; give a constant torque within ±87"),
+        ("sensor_drag", (5, 1), 13.0, "sensor_drag[5, 1] = 13 N m; give a constant torque within ±12"),
+        ("drag", (0, 2), 88.0, "drag[0, 2] = 88 N m; give dry friction from 0 to 87"),
+        ("sensor_friction", (2, 0), -0.1, "sensor_friction[2, 0] = -0.1 N m; give φ1 from 0 to 174, twice tau_max[2]"),
+    ],
+)
+def test_drag_that_is_none_or_drives_its_joint_is_refused(panda, field, index, value, text):
+    values = getattr(panda, field).copy()
+    values[index] = value
+    with pytest.raises(InvalidInputError) as caught:
+        replace(panda, **{field: values})
+    assert str(caught.value) == text

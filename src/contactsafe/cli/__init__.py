@@ -8,6 +8,7 @@ import contactsafe
 from contactsafe.cli.common import first_run
 from contactsafe.cli.evaluation import evaluate
 from contactsafe.cli.experiments import demo, experiment
+from contactsafe.cli.identification import identify, record
 from contactsafe.cli.logs import replay
 from contactsafe.cli.machine import bench, warmup
 from contactsafe.cli.training import train
@@ -31,6 +32,8 @@ COMMANDS = {
     "evaluate": _Command(evaluate, parses=True),
     "experiment": _Command(experiment, parses=True),
     "replay": _Command(replay, parses=True),
+    "identify": _Command(identify, parses=True),
+    "record": _Command(record, parses=True),
     "bench": _Command(bench),
     "warmup": _Command(warmup),
 }

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from contactsafe.cli.arms import CalibrationFile, load_calibration
 from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, progress, task_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
@@ -34,6 +35,7 @@ class Options:
         episodes: how many.
         seed: of episodes and noise.
         json: print JSON instead of a table.
+        calibration: what `contactsafe identify` wrote of the robot.
     """
 
     bundle: Annotated[BundleFolder, tyro.conf.Positional] = None
@@ -41,6 +43,7 @@ class Options:
     episodes: int = 50
     seed: int = 0
     json: bool = False
+    calibration: CalibrationFile = None
 
     def check(self) -> None:
         """Refuse numbers that cannot be."""
@@ -64,7 +67,9 @@ def evaluate(arguments: Sequence[str]) -> None:
     bundle = None if asked.scripted else load_bundle(asked.bundle, described.name)
     config = described.config(asked, None if bundle is None else bundle.conditions)
     most = _MOST_SIDE_BY_SIDE.get(asked.engine, 16)
-    env = make_vec(described.name, side_by_side(asked.episodes, most), config, asked.engine)
+    known = load_calibration(asked.calibration)
+    others: dict[str, Any] = {} if known is None else {"arm": known}
+    env = make_vec(described.name, side_by_side(asked.episodes, most), config, asked.engine, **others)
     if bundle is None:
         policy = described.scripted_policy(asked.scripted, config, env, asked.seed)
     else:

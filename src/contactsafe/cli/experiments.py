@@ -11,6 +11,7 @@ from typing import Annotated, get_args
 
 import tyro
 
+from contactsafe.cli.arms import CalibrationFile, load_calibration
 from contactsafe.cli.common import BundleFolder, Controllers, TaskName, described, load_bundle, progress
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse, some_of
@@ -20,6 +21,8 @@ from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.results.experiment import Experiment, to_json
+from contactsafe.robot import robots
+from contactsafe.robot.calibrated import arm_for
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 from contactsafe.tasks.base.registry import place_of
 
@@ -38,6 +41,7 @@ def demo(
     controllers: Controllers = ExperimentConfig.controllers,
     bundle: BundleFolder = None,
     task: TaskName = DEFAULT_TASK,
+    calibration: CalibrationFile = None,
 ) -> None:
     """Run the paper's three experiments and write a page about them.
 
@@ -48,15 +52,16 @@ def demo(
         controllers: presets to compare.
         bundle: folder of another policy.
         task: what the policy does.
+        calibration: what `contactsafe identify` wrote of the robot.
     """
     from contactsafe.report import prepare_output, terminal_table, write_report
 
     loaded = load_bundle(bundle, task)
-    config = ExperimentConfig(controllers, trials, seed, task=scenes_of(task, loaded), bundle=loaded)
+    config = ExperimentConfig(controllers, trials, seed, task=scenes_of(task, loaded, calibration), bundle=loaded)
     folder = prepare_output(out)
     started = time.monotonic()
     results = _run(registry.PAPER, config)
-    info = _run_info(_command("demo", config, task, bundle), config, time.monotonic() - started)
+    info = _run_info(_command("demo", config, task, bundle, calibration), config, time.monotonic() - started)
     print(terminal_table(results))
     page = write_report(folder, results, info)
     print(f"\nreport:  {page}\nsummary: {page.with_name('summary.json')}")
@@ -77,6 +82,7 @@ class Options:
         json: print tables, spreads and trials as JSON instead of text.
         bundle: folder of another policy.
         task: what the policy does.
+        calibration: what `contactsafe identify` wrote of the robot.
     """
 
     name: Annotated[str, one_of(registry.ENTRIES), tyro.conf.Positional]
@@ -89,6 +95,7 @@ class Options:
     json: bool = False
     bundle: BundleFolder = None
     task: TaskName = DEFAULT_TASK
+    calibration: CalibrationFile = None
 
 
 def experiment(arguments: Sequence[str]) -> None:
@@ -108,7 +115,7 @@ def experiment(arguments: Sequence[str]) -> None:
     folder = prepare_output(asked.out) if asked.out else None
     started = time.monotonic()
     results = _run([asked.name], config)
-    command = _command(f"experiment {asked.name}", config, asked.task, asked.bundle)
+    command = _command(f"experiment {asked.name}", config, asked.task, asked.bundle, asked.calibration)
     info = _run_info(command, config, time.monotonic() - started)
     page = write_report(folder, results, info) if folder else None
     print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
@@ -130,8 +137,9 @@ def _config(asked: Options, entry: Entry) -> ExperimentConfig:
         raise InvalidInputError(f"experiment {entry.name} takes no {' and no '.join(unread)}; leave that out")
     trials = entry.trials if asked.trials is None else asked.trials
     bundle = load_bundle(asked.bundle, asked.task) if "bundle" in entry.takes else None
-    scenes = scenes_of(asked.task, bundle) if "task" in entry.takes else None
-    return ExperimentConfig(asked.controllers, trials, asked.seed, asked.plants, asked.minutes, scenes, bundle)
+    scenes = scenes_of(asked.task, bundle, asked.calibration) if "task" in entry.takes else None
+    arm = arm_for(load_calibration(asked.calibration), robots.panda)
+    return ExperimentConfig(asked.controllers, trials, asked.seed, asked.plants, asked.minutes, scenes, bundle, arm)
 
 
 experiment.__doc__ = docstring(experiment).replace(
@@ -139,7 +147,7 @@ experiment.__doc__ = docstring(experiment).replace(
 )
 
 
-def scenes_of(task: str, bundle: Bundle | None = None) -> ExperimentTask:
+def scenes_of(task: str, bundle: Bundle | None = None, calibration: Path | None = None) -> ExperimentTask:
     """Return what the experiments ask of a task, under the conditions of the policy that does it.
 
     Raises:
@@ -148,7 +156,8 @@ def scenes_of(task: str, bundle: Bundle | None = None) -> ExperimentTask:
     described = task_by_name(task)
     if described.scenes is None:
         raise InvalidInputError(f"task '{task}' has no scenes for experiments; see docs/howto/own_task.md")
-    return described.scenes(described.config(None, None if bundle is None else bundle.conditions))
+    config, known = described.config(None, None if bundle is None else bundle.conditions), load_calibration(calibration)
+    return described.scenes(config) if known is None else described.scenes(config, known)
 
 
 def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:
@@ -161,7 +170,9 @@ def _run(names: Sequence[str], config: ExperimentConfig) -> list[Experiment]:
     return results
 
 
-def _command(name: str, config: ExperimentConfig, task: str, bundle: Path | None) -> str:
+def _command(
+    name: str, config: ExperimentConfig, task: str, bundle: Path | None, calibration: Path | None = None
+) -> str:
     """Return a command that runs a configuration again; it names what is not the default."""
     words = ["contactsafe", *name.split(), "--trials", f"{config.trials}", "--seed", f"{config.seed}"]
     words += ["--controllers", ",".join(config.controllers)]
@@ -169,6 +180,8 @@ def _command(name: str, config: ExperimentConfig, task: str, bundle: Path | None
         words += ["--task", place_of(task)]
     if bundle is not None:
         words += ["--bundle", str(bundle)]
+    if calibration is not None:
+        words += ["--calibration", str(calibration)]
     if config.plants != ExperimentConfig.plants:
         words += ["--plants", ",".join(config.plants)]
     if config.minutes != ExperimentConfig.minutes:

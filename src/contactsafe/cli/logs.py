@@ -1,4 +1,4 @@
-"""`contactsafe replay`: what the estimator makes of a robot's log."""
+"""`contactsafe replay`: what the estimator makes of a robot's log; and what all commands on logs can be told."""
 
 import shlex
 import sys
@@ -9,14 +9,12 @@ from typing import Annotated
 
 import tyro
 
+from contactsafe.cli.arms import CalibrationFile, arm_of
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.core.parse import docstring, parse
-from contactsafe.results.experiment import to_json
-from contactsafe.robot import robots
+from contactsafe.logs.log import Log
+from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.robot.arm import Arm
-
-KNOWN = {"panda": robots.panda, "fr3": robots.fr3}
-"""Robots by name; any other is the path of an MJCF file."""
 
 WORDS = (
     "Residuals are the external joint torques that the momentum observer finds in the log, thresholds those of the "
@@ -25,17 +23,18 @@ WORDS = (
 
 
 @dataclass(frozen=True)
-class Options:
+class LogOptions:
     """What can be said of a log.
 
     Attributes:
-        log: a CSV or NPZ file with time, q, and torque or command; qd and wrench_ee where there are any.
-        robot: panda, fr3, or the path of an MJCF file.
+        log: a CSV, NPZ or MCAP file with time, q, and torque or command; qd and wrench_ee where there are any.
+        robot: panda, fr3, or the path of an MJCF or URDF file.
         tool: what a Franka's flange carries: hand, wiper, or flange for nothing.
-        site: end-effector point of an MJCF file.
+        site: end-effector point of an MJCF file, or link of a URDF file.
         columns: names that the log has for something, such as torque=tau_meas.
         rate: of the log's rows, Hz, where it has no time.
-        wrench: a log without a wrench is of an arm whose tool touches nothing.
+        topic: of an MCAP's joint states, where several topics have some.
+        joints: names that an MCAP has for the arm's joints, from base to tip, where they are not the arm's own.
         out: folder for the page.
         json: print JSON instead of text.
     """
@@ -46,9 +45,36 @@ class Options:
     site: str | None = None
     columns: tuple[str, ...] = ()
     rate: float | None = None
-    wrench: bool = True
+    topic: str | None = None
+    joints: tuple[str, ...] = ()
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None
     json: bool = False
+
+    def read(self, arm: Arm) -> Log:
+        """Read the log of an arm.
+
+        Raises:
+            InvalidInputError: it is none; see `read_log`.
+        """
+        from contactsafe.logs.reading import read_log
+
+        if self.rate is not None and not 0.0 < self.rate < 1e6:
+            raise InvalidInputError(f"rate = {self.rate:g} Hz; give a number greater than 0")
+        names = self.joints or tuple(arm.model.joint(i).name for i in range(arm.n))
+        return read_log(self.log, _mapped(self.columns), self.rate, self.topic, names)
+
+
+@dataclass(frozen=True)
+class Options(LogOptions):
+    """What can be said of a replay.
+
+    Attributes:
+        wrench: a log without a wrench is of an arm whose tool touches nothing.
+        calibration: what `contactsafe identify` wrote of this robot.
+    """
+
+    wrench: bool = True
+    calibration: CalibrationFile = None
 
 
 def replay(arguments: Sequence[str]) -> None:
@@ -56,22 +82,35 @@ def replay(arguments: Sequence[str]) -> None:
 
     Says in one line what the log shows, lists what touched the arm, and writes a page with every joint's residual.
     """
-    from contactsafe.logs.reading import read_log
     from contactsafe.logs.replay import replay as play
     from contactsafe.logs.results import results_of
-    from contactsafe.report import prepare_output, terminal_table, write_report
-    from contactsafe.report.data import Words
+    from contactsafe.report import prepare_output
 
     asked = parse(Options, "contactsafe replay", arguments, description=docstring(replay))
-    arm = _arm(asked.robot, asked.tool, asked.site)
-    if asked.rate is not None and not 0.0 < asked.rate < 1e6:
-        raise InvalidInputError(f"rate = {asked.rate:g} Hz; give a number greater than 0")
+    arm = arm_of(asked.robot, asked.tool, asked.site, asked.calibration)
+    log = asked.read(arm)
     folder = prepare_output(asked.out) if asked.out else None
-    found = results_of(play(read_log(asked.log, _mapped(asked.columns), asked.rate), arm, wrench=asked.wrench))
+    found = results_of(play(log, arm, wrench=asked.wrench))
+    command = shlex.join(["contactsafe", "replay", *arguments])
+    tell(found, asked, folder, command, (f"What touched the {arm.name}", WORDS))
+
+
+def tell(found: Experiment, asked: LogOptions, folder: Path | None, command: str, words: tuple[str, str]) -> None:
+    """Print what was found in a log, and write its page where a folder was asked for.
+
+    Args:
+        found: results.
+        asked: options.
+        folder: for the page, None for none.
+        command: that found it.
+        words: title of the page, and how to read it.
+    """
+    from contactsafe.report import terminal_table, write_report
+    from contactsafe.report.data import Words
+
     if folder is not None:
-        words = Words(f"contactsafe: {asked.log.name}", f"What touched the {arm.name}", found.question, WORDS)
-        command = shlex.join(["contactsafe", "replay", *arguments])
-        page = write_report(folder, [found], {"command": command}, words)
+        said = Words(f"contactsafe: {asked.log.name}", words[0], found.question, words[1])
+        page = write_report(folder, [found], {"command": command}, said)
         print(f"report: {page}", file=sys.stderr)
     print(to_json(found.as_dict()) if asked.json else f"{terminal_table([found])}\n{found.question}")
 
@@ -82,16 +121,3 @@ def _mapped(columns: tuple[str, ...]) -> dict[str, str]:
         if not (name and equals and column):
             raise InvalidInputError(f"columns = {shown(text)} maps nothing; write what is held=its name in the log")
     return {name: column for name, _, column in pairs}
-
-
-def _arm(robot: str, tool: str, site: str | None) -> Arm:
-    if robot in KNOWN:
-        if site is not None:
-            raise InvalidInputError(f"site = {shown(site)} is for an MJCF file; leave it out for {robot}")
-        return KNOWN[robot](tool)
-    path = Path(robot)
-    if not path.exists():
-        raise InvalidInputError(f"robot {shown(robot)} is neither {', '.join(KNOWN)} nor a file; give its MJCF")
-    if site is None:
-        raise InvalidInputError(f"{path.name} has end-effector points of its own; say which, --site NAME")
-    return robots.from_mjcf(str(path), site)

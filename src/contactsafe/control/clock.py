@@ -26,6 +26,7 @@ from contactsafe.control.prediction import net_torque, predict
 from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_vector
+from contactsafe.robot.friction import joint_drag_into
 
 _f = np.float64
 _i = np.int64
@@ -74,6 +75,8 @@ def receive(c: Record, usable: bool) -> None:
         reason, clock.at_rest = 0, 0  # whatever is measured now is where the arm is
     if reason == 0:
         _accept(state, c.measurement, c.params.clock.dt, since, timed)
+        if state.arm.has_torque != 0 and c.params.arm.sensor_errs != 0:
+            _correct_torque(state.arm, c.params.arm)
     else:
         net = net_torque(state, c.dynamics, c.params.observer, stack_vector(state.arm.q.shape[0]))
         predict(state.arm, net, c.dynamics.M_inv, usual * c.params.clock.dt, c.params.arm)
@@ -177,6 +180,15 @@ def _accept(state: Record, m: Record, dt: float, since: float, timed: bool) -> N
     arm.has_torque = 1 if m.has_torque != 0 and all_usable(m.torque) else 0
     if arm.has_torque != 0:
         arm.torque[:] = m.torque
+
+
+@compiled
+def _correct_torque(arm: Record, known: Record) -> None:
+    """Take off the measured torque what the sensors are known to show beside it, at the velocity of now."""
+    beside = stack_vector(arm.q.shape[0])
+    joint_drag_into(known.sensor_friction, known.sensor_drag, arm.qd, beside)
+    for i in range(arm.q.shape[0]):
+        arm.torque[i] -= beside[i]
 
 
 @compiled

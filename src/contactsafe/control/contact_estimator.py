@@ -14,7 +14,7 @@ from contactsafe.control.presets import safe
 from contactsafe.control.signals import Contact, Measurement, contact_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm, require_arm
-from contactsafe.robot.friction import joint_friction
+from contactsafe.robot.friction import joint_drag
 
 RATES_HZ = (90.0, 2000.0)
 """Lowest and highest rate of measurements that the estimator is made for."""
@@ -125,7 +125,8 @@ class ContactEstimator(Instance):
         if self.record["state"]["clock"]["bridged"] == 0 and believed.all():
             state, expects = self.record["state"], self.config.impedance.friction_compensation and not measured
             state["command"]["tau"] = sent
-            state["command"]["friction"] = joint_friction(self.arm.friction, state["arm"]["qd"]) if expects else 0.0
+            drag = joint_drag(self.arm.friction, self.arm.drag, state["arm"]["qd"]) if expects else 0.0
+            state["command"]["friction"] = drag
 
 
 def _whole(measurement: Measurement, command: ArrayLike | None) -> Measurement:

@@ -18,7 +18,7 @@ from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot, matvec_into
 from contactsafe.core.stack import stack_vector
-from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.friction import joint_drag_into
 
 _f = np.float64
 _i = np.int64
@@ -82,7 +82,7 @@ def limit_command(c: Record, tau: Vector) -> tuple[int, bool]:
     tau += dynamics.g
     command.friction[:] = 0.0
     if params.impedance.friction_compensation != 0:
-        tau += joint_friction_into(params.arm.friction, state.arm.qd, command.friction)
+        tau += joint_drag_into(params.arm.friction, params.arm.drag, state.arm.qd, command.friction)
     finite = replace_unusable(tau, command.tau) and finite
     clipped = limit_torque(tau, command.tau, params.arm.tau_max, step.torque_step, dynamics.M_inv) or clipped
     return limited_by | LIMITED_BY_RATE if clipped else limited_by, finite

@@ -77,6 +77,7 @@ class PolicyConfig:
         seed: of weights, exploration and episodes.
         threads: torch's. More than one crawls as soon as anything else wants a core.
         encoder_threads: ONNX Runtime's.
+        calibration: what `contactsafe identify` wrote of the robot; None for the task's arm by its description.
     """
 
     algorithm: ClassVar[str]
@@ -107,6 +108,7 @@ class PolicyConfig:
     seed: int = 0
     threads: int = 1
     encoder_threads: int = 2
+    calibration: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers with which nothing can be trained."""

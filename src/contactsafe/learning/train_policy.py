@@ -29,6 +29,7 @@ from contactsafe.policy.observation import ObservationScaling, chosen
 from contactsafe.policy.perception import NO_IMAGE, PAPER
 from contactsafe.policy.policy import Policy
 from contactsafe.results.experiment import to_json
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks import TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED, evaluate_policy, side_by_side
 
@@ -74,7 +75,11 @@ def _environments(config: PolicyConfig) -> tuple[MakeEnv, MakeEnv]:
     training, nominal = (
         task.training_config(randomise, config.conditions, config.gentleness) for randomise in (config.randomise, False)
     )
-    return lambda n: make_vec(task.name, n, training), lambda n: make_vec(task.name, n, nominal)
+    others: dict[str, Any] = {} if config.calibration is None else {"arm": Calibration.load(config.calibration)}
+    return (
+        lambda n: make_vec(task.name, n, training, **others),
+        lambda n: make_vec(task.name, n, nominal, **others),
+    )
 
 
 def _encoder(config: PolicyConfig) -> VisionEncoder | None:

@@ -1,4 +1,4 @@
-"""Reading logs: CSV and NPZ, whose columns have the usual names or are mapped."""
+"""Reading logs: CSV, NPZ and MCAP, whose columns have the usual names or are mapped."""
 
 import csv
 import re
@@ -10,6 +10,7 @@ import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.logs.log import Log
+from contactsafe.logs.mcap_reading import read_mcap
 
 NAMES: dict[str, tuple[str, ...]] = {
     "time": ("time", "t", "timestamp", "stamp", "time_s"),
@@ -22,16 +23,24 @@ NAMES: dict[str, tuple[str, ...]] = {
 """What a log has, and the names by which it is found where none is given."""
 
 
-def read_log(path: Path, columns: Mapping[str, str] | None = None, rate_hz: float | None = None) -> Log:
+def read_log(
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    rate_hz: float | None = None,
+    topic: str | None = None,
+    joints: Sequence[str] | None = None,
+) -> Log:
     """Read a log.
 
     Columns of a CSV are named by what they hold and a number, as q_0 … q_6, q1 … q7 or q[0] … q[6]; an NPZ has an array
-    (T, n) by each name.
+    (T, n) by each name. An MCAP has joint states of ROS 2, or JSON messages with an array by each name.
 
     Args:
-        path: of a file that ends in .csv or .npz.
+        path: of a file that ends in .csv, .npz or .mcap.
         columns: names that differ from `NAMES`: what is held → name in the file.
         rate_hz: of its rows, where it has no time.
+        topic: of an MCAP's messages; None for the only one that has joint states.
+        joints: names of the arm's joints from base to tip, by which an MCAP's are put in order; None for their own.
 
     Raises:
         InvalidInputError: it cannot be read, something needed is missing, or no robot recorded it; see `Log`.
@@ -40,14 +49,20 @@ def read_log(path: Path, columns: Mapping[str, str] | None = None, rate_hz: floa
     for known in columns:
         if known not in NAMES:
             raise InvalidInputError(f"column {shown(known)} is nothing a log has; choose from {', '.join(NAMES)}")
-    readers = {".csv": _read_csv, ".npz": _read_npz}
+    readers = {".csv": _read_csv, ".npz": _read_npz, ".mcap": lambda path: read_mcap(path, topic, joints)}
     if path.suffix.lower() not in readers:
-        raise InvalidInputError(f"{path.name} is no log that can be read; give a file that ends in .csv or .npz")
+        raise InvalidInputError(f"{path.name} is no log that can be read; give a file that ends in .csv, .npz or .mcap")
     try:
         arrays = readers[path.suffix.lower()](path)
     except OSError as error:
         raise InvalidInputError(f"{path} cannot be read: {error.strerror or error}; give a log") from None
-    found = {known: _pick(path.name, arrays, known, columns.get(known)) for known in NAMES}
+    if topic is not None and path.suffix.lower() != ".mcap":
+        raise InvalidInputError(f"topic = {shown(topic)} is for an MCAP; leave it out for {path.name}")
+    mapped = set(columns.values())
+    found = {}
+    for known in NAMES:
+        rest = arrays if known in columns else {name: array for name, array in arrays.items() if name not in mapped}
+        found[known] = _pick(path.name, rest, known, columns.get(known))
     given = {known: values for known, values in found.items() if values is not None}
     if "q" not in given or ("time" not in given and rate_hz is None):
         raise InvalidInputError(

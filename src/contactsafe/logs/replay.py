@@ -77,7 +77,7 @@ class Replay:
         if abs(off[worst]) > _OFF:
             return (
                 f"{felt}: the residual of joint {worst + 1} lies about {off[worst]:+.0%} of its threshold, as if the "
-                "arm were another; check robot, tool, payload and gravity"
+                "arm were another; check robot, tool, payload and gravity, or run contactsafe identify"
             )
         if not self.touches:
             largest = np.abs(self.residual / self.threshold).max(axis=0)

@@ -66,6 +66,9 @@ class Arm(Independent):
         torque_rate_max: N m/s, every joint; 1e9 allows any torque at once.
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
+        drag: viscous friction N m s/rad, constant torque N m and dry friction N m beside `friction`, (n, 3).
+        sensor_friction, sensor_drag: of the same form, what torque sensors behind the gears show beside the torque that
+            drives the links, (n, 3) each: a bias, hysteresis. By default nothing.
         description: what the model was generated from, or for a user's own what was derived from it; None where
             nobody says.
         tool: what the flange carries; None likewise.
@@ -76,8 +79,8 @@ class Arm(Independent):
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
     Raises:
-        InvalidInputError: gravity, the model, a limit, friction or home is not finite or not one row a joint, a mass or
-            friction is negative, or a joint's range is empty.
+        InvalidInputError: gravity, the model, a limit, friction, drag or home is not finite or not one row a joint, a
+            mass or friction is negative, or a joint's range is empty.
     """
 
     name: str
@@ -95,11 +98,17 @@ class Arm(Independent):
     surface: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     lever_doubted: float = 0.0
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
+    drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
         if len(self.places) == 0:
             object.__setattr__(self, "places", touchable(self.surface, self.tool))
+        for name in ("drag", "sensor_friction", "sensor_drag"):
+            if np.size(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.zeros((self.n, 3)))
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
         refuse_unsound(self)

@@ -2,14 +2,20 @@
 
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.robot.arm import Arm, arm_from_description
+from contactsafe.robot.calibrated import calibrated
+from contactsafe.robot.calibration import Calibration
 from contactsafe.robot.description import Tip, Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import FLANGE, HAND, WIPER
 from contactsafe.robot.panda import PANDA
 from contactsafe.robot.user_mjcf import from_mjcf
+from contactsafe.robot.user_urdf import from_urdf
 from contactsafe.robot.wrist import WristNames
 
-__all__ = ["FLANGE", "HAND", "WIPER", "Tip", "Tool", "WristNames", "fr3", "from_mjcf", "panda"]
+__all__ = [
+    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf",
+    "from_urdf", "panda",
+]  # fmt: skip
 
 TOOLS = {"flange": FLANGE, "hand": HAND, "wiper": WIPER}
 """What a Franka's flange may carry, by name."""

@@ -21,7 +21,10 @@ _GRAVITY_MAX = 1e3
 _TORQUE_RATES = (1e-6, 1e12)
 """N m/s; beyond, what is divided by one is no number."""
 
-_PER_JOINT = {"q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": ()}
+_PER_JOINT = {
+    "q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": (), "drag": (3,),
+    "sensor_friction": (3,), "sensor_drag": (3,),
+}  # fmt: skip
 """What an arm has of every joint, and the shape of it."""
 
 
@@ -78,12 +81,15 @@ def refuse_unsound(arm: Any) -> None:
         arm: `Arm`, whose numbers are as `as_numbers` gives them.
 
     Raises:
-        InvalidInputError: gravity, the model, a limit, friction, home or surface is not finite, a mass or friction is
-            negative, or a joint's range is empty.
+        InvalidInputError: gravity, the model, a limit, friction, drag, home or surface is not finite, a mass or
+            friction is negative, or a joint's range is empty.
     """
     _refuse_unsound_model(arm)
     _refuse_unsound_limits(arm)
-    _refuse_unsound_friction(arm)
+    _refuse_unsound_friction(arm, "friction")
+    _refuse_unsound_friction(arm, "sensor_friction")
+    _refuse_unsound_drag(arm, "drag")
+    _refuse_unsound_drag(arm, "sensor_drag")
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
@@ -136,16 +142,28 @@ def _refuse_unsound_limits(arm) -> None:
         )
 
 
-def _refuse_unsound_friction(arm) -> None:
+def _refuse_unsound_friction(arm, name: str) -> None:
     """Refuse friction that drives a joint, and that no motor overcomes: φ1 is the sum of both directions."""
-    for i, (phi1, phi2, phi3) in enumerate(arm.friction):
+    for i, (phi1, phi2, phi3) in enumerate(getattr(arm, name)):
         most = 2.0 * arm.tau_max[i]
         if not 0.0 <= phi1 <= most:
-            raise InvalidInputError(f"friction[{i}, 0] = {phi1:g} N m; give φ1 from 0 to {most:g}, twice tau_max[{i}]")
+            raise InvalidInputError(f"{name}[{i}, 0] = {phi1:g} N m; give φ1 from 0 to {most:g}, twice tau_max[{i}]")
         if not 0.0 <= phi2 < np.inf:
-            raise InvalidInputError(f"friction[{i}, 1] = {phi2:g} s/rad; give a finite φ2 from 0 on")
+            raise InvalidInputError(f"{name}[{i}, 1] = {phi2:g} s/rad; give a finite φ2 from 0 on")
         if not np.isfinite(phi3):
-            raise InvalidInputError(f"friction[{i}, 2] = {phi3:g} rad/s; give a finite φ3")
+            raise InvalidInputError(f"{name}[{i}, 2] = {phi3:g} rad/s; give a finite φ3")
+
+
+def _refuse_unsound_drag(arm, name: str) -> None:
+    """Refuse viscous and dry friction that drive a joint, and constants that no motor overcomes."""
+    for i, (viscous, constant, dry) in enumerate(getattr(arm, name)):
+        most = arm.tau_max[i]
+        if not 0.0 <= viscous < np.inf:
+            raise InvalidInputError(f"{name}[{i}, 0] = {viscous:g} N m s/rad; give viscous friction from 0 on")
+        if not abs(constant) <= most:
+            raise InvalidInputError(f"{name}[{i}, 1] = {constant:g} N m; give a constant torque within ±{most:g}")
+        if not 0.0 <= dry <= most:
+            raise InvalidInputError(f"{name}[{i}, 2] = {dry:g} N m; give dry friction from 0 to {most:g}")
 
 
 def _listed(numbers) -> str:

@@ -8,6 +8,8 @@ import numpy as np
 from contactsafe.control.laws import filter_gain
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
+from contactsafe.core.stack import stack_vector
+from contactsafe.robot.friction import joint_drag_into
 
 _f = np.float64
 _i = np.int64
@@ -28,6 +30,8 @@ def joint_sensors_dtype(n: int) -> np.dtype:
             ("torque_bias", _f, (n,)),  # N m
             ("play", _f),  # half the width of the hysteresis, N m
             ("rotor", _f, (n,)),  # inertia before the sensor, kg m²
+            ("friction", _f, (n, 3)),  # that is shown beside the torque: N m, s/rad, rad/s
+            ("drag", _f, (n, 3)),  # likewise, N m s/rad, N m and N m
             ("torque_held", _f, (n,)),  # that the hysteresis shows, N m
             ("qd_before", _f, (n,)),  # of the plant a tick ago, rad/s
         ]
@@ -65,6 +69,8 @@ def sense_torque(world: Record, measurement: Record, noise: Vector, dt: float) -
         dt: s.
     """
     joints, truth = world.errors.joints, world.truth
+    beside = stack_vector(measurement.torque.shape[0])
+    joint_drag_into(joints.friction, joints.drag, truth.qd, beside)
     for i in range(measurement.torque.shape[0]):
         torque = world.motor[i] - world.drag[i]
         torque -= joints.rotor[i] * (truth.qd[i] - joints.qd_before[i]) / dt
@@ -72,5 +78,5 @@ def sense_torque(world: Record, measurement: Record, noise: Vector, dt: float) -
         held = joints.torque_held[i]
         held = min(max(held, torque - joints.play), torque + joints.play)
         joints.torque_held[i] = held
-        measurement.torque[i] = held + joints.torque_bias[i] + joints.torque_sigma * noise[i]
+        measurement.torque[i] = held + joints.torque_bias[i] + joints.torque_sigma * noise[i] + beside[i]
     measurement.has_torque = 1

@@ -16,7 +16,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.linalg import cross_into, matvec_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.friction import joint_drag_into
 from contactsafe.sim.config import SensorConfig, WorldConfig, per_joint
 from contactsafe.sim.joint_sensors import band_gain, joint_sensors_dtype, sense_torque, velocity_noise
 from contactsafe.sim.stiction import add_stiction
@@ -53,6 +53,7 @@ def errors_dtype(n: int) -> np.dtype:
             ("tool_com", _f, (3,)),  # mount frame, m
             ("tcp", _f, (3,)),  # mount frame, m
             ("friction", _f, (n, 3)),  # N m, s/rad, rad/s; already scaled
+            ("drag", _f, (n, 3)),  # viscous, constant and dry beside it, N m s/rad, N m; already scaled
             ("stiction", _f, (n,)),  # dry friction, N m
             ("bristle", _f, (n,)),  # how far it is taken up, −1 … 1
             ("joints", joint_sensors_dtype(n)),
@@ -84,11 +85,15 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     errors["tcp"] = arm.tool.tcp
     errors["friction"] = arm.friction
     errors["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
+    errors["drag"] = arm.drag
+    for column in (0, 2):
+        errors["drag"][:, column] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
     errors["stiction"] = per_joint(config.plant.stiction_nm, arm.n, "stiction_nm")
     joints = errors["joints"]
     joints["band_sigma"] = sensors.velocity_band_rad_s * band_gain(tick_s)
     joints["has_torque"], joints["torque_sigma"] = sensors.joint_torque, sensors.joint_torque_nm
     joints["play"], joints["rotor"] = sensors.joint_torque_play_nm, arm.model.dof_armature
+    joints["friction"], joints["drag"] = arm.sensor_friction, arm.sensor_drag
     errors["delay_ticks"] = config.plant.torque_delay_ticks
 
 
@@ -155,7 +160,7 @@ def actuate(world: Record, controller: Record, noise: Vector) -> None:
     """
     errors, tau = world.errors, controller.output.torque
     n = tau.shape[0]
-    joint_friction_into(errors.friction, world.truth.qd, world.drag)
+    joint_drag_into(errors.friction, errors.drag, world.truth.qd, world.drag)
     for i in range(n):
         command = errors.tau_delayed[i] if errors.delay_ticks > 0 else tau[i]
         errors.tau_delayed[i] = tau[i]

@@ -15,6 +15,7 @@ from contactsafe.policy.action_config import ACTION_SIZE
 from contactsafe.policy.observation import Observation
 from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.figures import EpisodeMetric, Figure
 from contactsafe.tasks.base.registry import backend_of, task_by_name
@@ -40,7 +41,7 @@ class Environment(Independent):
         num_envs: int,
         config: TaskConfig | None,
         engine: str,
-        arm: Arm | None,
+        arm: Arm | Calibration | None,
         render_mode: str | None,
         max_episode_steps: int | None,
     ) -> tuple[gymnasium.spaces.Dict, gymnasium.spaces.Box]:

@@ -85,7 +85,7 @@ class Task:
     as_paper: Variant | None = None
     scripted: Scripted = field(default_factory=lambda: RANDOM)
     mask_sampler: Callable[[], MaskSampler] | None = None
-    scenes: Callable[[Any], Any] | None = None
+    scenes: Callable[..., Any] | None = None
     warmup: tuple[tuple[str, str, TaskConfig, str], ...] = ()
 
     @property

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.environment import Environment, seed_of
 from contactsafe.tasks.base.tasks import Tasks
@@ -22,7 +23,7 @@ class TaskEnv(Environment, gymnasium.Env):
         task: name of the task, or its class.
         config: of the task.
         engine: 'mujoco' or 'pybullet'.
-        arm: that works; None for the task's own.
+        arm: that works; None for the task's own, or what was identified of that.
         render_mode: 'rgb_array' renders the task's picture, or None.
         max_episode_steps: in place of `config.episode_s`; `gymnasium.make` takes this for the shorter of the two.
     """
@@ -32,7 +33,7 @@ class TaskEnv(Environment, gymnasium.Env):
         task: str | type[Tasks] = "wiping",
         config: TaskConfig | None = None,
         engine: str = "mujoco",
-        arm: Arm | None = None,
+        arm: Arm | Calibration | None = None,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
     ):

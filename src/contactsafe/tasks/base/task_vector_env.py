@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, load_state_dict, of_array, of_generators, of_object, state_dict
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks.base.config import TaskConfig
 from contactsafe.tasks.base.environment import Environment, seed_of
 from contactsafe.tasks.base.tasks import Tasks
@@ -40,7 +41,7 @@ class TaskVectorEnv(Environment, gymnasium.vector.VectorEnv):
         task: str | type[Tasks] = "wiping",
         config: TaskConfig | None = None,
         engine: str = "mujoco",
-        arm: Arm | None = None,
+        arm: Arm | Calibration | None = None,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,

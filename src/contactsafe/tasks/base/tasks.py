@@ -15,7 +15,9 @@ from contactsafe.policy.action_config import ACTION_SIZE, action_limits
 from contactsafe.policy.observation import Observation, check_fields
 from contactsafe.policy.rate import POLICY_RATE_HZ, ticks_of_step
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm, Pose, require_arm
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.calibrated import arm_for
+from contactsafe.robot.calibration import Calibration
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
@@ -39,7 +41,7 @@ class Tasks(Independent):
         n: how many.
         seed: of the sensors' noise; what an episode samples comes from the generator given to `reset`.
         worlds: one configuration for each task in place of `config.world`, such as obstacles of its own.
-        arm: that works; None for the task's own.
+        arm: that works; None for the task's own, or what was identified of that.
         backend: what computes the physics in place of MuJoCo; see `contactsafe.sim.backend`.
 
     Attributes:
@@ -84,11 +86,11 @@ class Tasks(Independent):
         n: int = 1,
         seed: int | Sequence[int] | None = None,
         worlds: Sequence[WorldConfig] | None = None,
-        arm: Arm | None = None,
+        arm: Arm | Calibration | None = None,
         backend: Callable[..., Backend] | None = None,
     ):
         self.config = self._checked(config)
-        self.arm = self.default_arm() if arm is None else require_arm(arm)
+        self.arm = arm_for(arm, self.default_arm)
         self._backend = backend
         self._ik = InverseKinematics(self.arm)
         for pose in self.reached():

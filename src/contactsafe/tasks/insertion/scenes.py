@@ -14,6 +14,8 @@ from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import level_rectangle
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.calibrated import arm_for
+from contactsafe.robot.calibration import Calibration
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.tasks.base.episodes import TaskEpisodes
@@ -84,10 +86,10 @@ class Insertion(TaskScenes[InsertionTasks, InsertionConfig]):
     highlights: tuple[Highlight, ...] = (Highlight("inserting", "inserted", "Pegs inserted, holes never met before"),)
     panels: tuple[Panel, ...] = (Panel("depth", "mm", lambda run: 1000.0 * run.curves["depth"]),)
 
-    def __init__(self, config: InsertionConfig | None = None, arm: Arm | None = None):
+    def __init__(self, config: InsertionConfig | None = None, arm: Arm | Calibration | None = None):
         config = config or InsertionConfig()
         face = level_rectangle(config.mouth, (2 * BLOCK_HALF, 2 * BLOCK_HALF))
-        super().__init__(config, arm or robots.panda(PEG), face, {HOLE: (20, 20, 20)})
+        super().__init__(config, arm_for(arm, lambda: robots.panda(PEG)), face, {HOLE: (20, 20, 20)})
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> InsertionEpisodes:
         """Return held-out holes."""

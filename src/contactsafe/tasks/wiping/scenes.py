@@ -17,6 +17,8 @@ from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import level_rectangle
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, Pose
+from contactsafe.robot.calibrated import arm_for
+from contactsafe.robot.calibration import Calibration
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.tasks.base.episodes import TaskEpisodes, held_out
@@ -96,10 +98,10 @@ class Wiping(TaskScenes[WipingTasks, WipingConfig]):
     highlights: tuple[Highlight, ...] = (Highlight("wiping", "ink_removed", "Ink wiped off boards never seen before"),)
     panels: tuple[Panel, ...] = (Panel("ink left", "%", lambda run: 100.0 * run.curves["ink_left"]),)
 
-    def __init__(self, config: WipingConfig | None = None, arm: Arm | None = None):
+    def __init__(self, config: WipingConfig | None = None, arm: Arm | Calibration | None = None):
         config = config or WipingConfig()
         board = level_rectangle(config.board.centre, config.board.size)
-        super().__init__(config, arm or robots.panda(), board, {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
+        super().__init__(config, arm_for(arm, robots.panda), board, {INK: (24, 48, 104), OBJECT: (20, 20, 22)})
 
     def episodes(self, controller: str, seeds: Sequence[int]) -> WipingEpisodes:
         """Return held-out boards."""
