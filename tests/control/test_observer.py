@@ -28,7 +28,7 @@ def test_step_is_taken_up_exponentially_exactly_at_the_ticks(gain, tau):
 @pytest.mark.parametrize("preset", PRESETS.values())
 def test_controller_takes_a_step_up_as_its_gain_says(panda, preset):
     """An arm that stands still although g − τ is commanded is held by τ."""
-    config = preset().with_(residual_cutoff_hz=math.inf)
+    config = preset().with_(residual_cutoff_hz=math.inf, residual_noise_nm=math.inf)
     controller, still = controller_at(panda, config), Measurement(panda.home, np.zeros(7))
     controller.step(still, hold(panda))
     tau = np.array([1.0, -2.0, 3.0, -4.0, 5.0, -6.0, 7.0])

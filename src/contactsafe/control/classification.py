@@ -51,22 +51,18 @@ def begin_classification(classification: Record) -> None:
 
 
 @inlined
-def classify(
-    classification: Record, direction: Vector, lever: float, torque: Vector, mode: int, step: Record, params: Record
-) -> int:
+def classify(classification: Record, isolation: Record, torque: Vector, mode: int, step: Record, params: Record) -> int:
     """Return what the contact has shown itself to be in this tick: OBSTACLE, PUSH, or NO_CONTACT for nothing new.
 
     Args:
         classification: `classification_dtype` record; advanced.
-        direction: unit joint-space direction of the contact's torque on the arm, (n,).
-        lever: of the contact, m.
+        isolation: up to date; the longest lever arm is probed with, a short guess would let the arm be carried away.
         torque: of the contact on the arm, (n,), N m.
-        mode: in force.
-        step: of the state.
+        mode, step: in force.
         params: of classification.
     """
-    _follow_contact(classification, direction, torque, step)
-    displacement, probe = classification.displacement_smooth_rad, params.probe_m / lever
+    _follow_contact(classification, isolation.direction, torque, step)
+    displacement, probe = classification.displacement_smooth_rad, params.probe_m / isolation.lever_max
     if displacement <= 0.0:  # the arm moves into it
         classification.displacement_rad -= displacement
         classification.displacement_smooth_rad = 0.0
@@ -77,7 +73,7 @@ def classify(
         return NO_CONTACT
     classification.decision_rad = displacement + probe
     drop = classification.reference_nm - classification.torque_smooth_nm
-    if is_push(drop, displacement, lever, params.obstacle_stiffness_min):
+    if is_push(drop, displacement, isolation.lever, params.obstacle_stiffness_min):
         return PUSH
     return NO_CONTACT if mode == REJECT and displacement < _CERTAIN * probe else OBSTACLE
 

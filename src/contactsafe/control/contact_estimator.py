@@ -41,9 +41,7 @@ class ContactEstimator(Instance):
     """
 
     def __init__(self, arm: Arm, config: ControllerConfig | None = None, dt: float = 0.001) -> None:
-        super().__init__(
-            require_arm(arm), _at_rate(checked_config(safe() if config is None else config), dt), None, 0
-        )
+        super().__init__(require_arm(arm), _at_rate(checked_config(safe() if config is None else config), dt), None, 0)
         self.reset(np.clip(arm.home, arm.q_min, arm.q_max))
         self.step(Measurement(arm.home, np.zeros(arm.n), torque=np.zeros(arm.n)))  # compiles, or loads what was
         self.places()

@@ -63,12 +63,10 @@ def follow_noise(
 ) -> None:  # fmt: skip
     """Measure the noise of the residual at full bandwidth, and set the bandwidth that keeps it to what is allowed.
 
-    What the model may be wrong by is no noise: the thresholds allow for it already.
-
     Args:
         noise: `noise_dtype` record; advanced.
         raw: external torque before any filter, (n,), N m.
-        model_uncertainty: of it, (n,), N m.
+        model_uncertainty: of it, (n,), N m; no noise, since the thresholds allow for it already.
         of_positions: whether any joint's velocity is a difference of positions.
         step: of the state.
         untouched: whether nothing touches the arm; else nothing is learned.

@@ -27,8 +27,11 @@ def vices() -> ControllerConfig:
 SAFE: dict[str, tuple[float | bool | str, str]] = {
     "compensation_gain": (50.0, "the printed 1.5 1/s answers a contact after most of its impulse has passed"),
     "detection_gain": (250.0, "lag of 4 ms, that of the low-pass behind it"),
-    "velocity_source": ("quieter", "a real Panda's velocity has 4 to 6 mrad/s of noise, which would look like contact"),
-    "residual_noise_nm": (0.25, "a sixth of δ: noise beyond it is filtered, or a false contact would be a matter of hours"),
+    "velocity_source": ("quieter", "a real Panda's own velocity has noise of 4 to 6 mrad/s, which looks like contact"),
+    "residual_noise_nm": (
+        0.25,
+        "a sixth of δ; noise beyond it is filtered, or it would reach δ within hours",
+    ),
     "residual_cutoff_hz": (40.0, "noise of joint velocities stays below δ, and the lag at 4 ms"),
     "friction_uncertainty": (0.3, "friction models are off by 20 %; what is left would look like contact"),
     "inertia_uncertainty": (0.15, "so are inertias; quick motion would look like contact"),
@@ -48,7 +51,6 @@ SAFE: dict[str, tuple[float | bool | str, str]] = {
     "contact_torque_limit_comply_nm": (2.0, "just above δ, so that the contact stays detected while the arm complies"),
     "contact_torque_limit_reject_nm": (22.0, "a push of 45 N at half a metre"),
     "contact_force_limit_comply_n": (2.5, "less than what pushes a light obstacle along"),
-    "contact_force_limit_reject_n": (45.0, "a little more than the pushes of 40 N that the tool must withstand"),
     "contact_force_limit_initial_n": (17.0, "a push that begins must not displace the tool before it is classified"),
     "tool_force_limit_n": (20.0, "room for what a tool needs; a policy can press with no more"),
     "probe_m": (0.0005, "the shortest displacement that stands out of the noise: the tool hardly moves under a push"),

@@ -27,10 +27,7 @@ def supervise(c: Record) -> None:
         isolate(state.isolation, c.handle, link, torque, params.arm.lever_doubted)
     follow_velocity(state.classification, state.arm.qd, state.step)
     if state.mode != FREE:
-        shown = classify(
-            state.classification, state.isolation.direction, state.isolation.lever, torque, state.mode, state.step,
-            params.classification,
-        )  # fmt: skip
+        shown = classify(state.classification, state.isolation, torque, state.mode, state.step, params.classification)
         along = state.classification.torque_smooth_nm
         state.mode = react(state.reaction, state.mode, shown, along, state.step.dt, params.reaction)
     c.output.link = state.isolation.link if state.mode != FREE and state.isolation.link != 0 else link

@@ -31,10 +31,13 @@ _LEAST_S, _LEAST_TICKS = 0.06, 10.0
 """After so long, and so many measurements, both are compared first."""
 
 _SETTLE_TICKS = 3.0
-"""Measurements in time from which on variances are learned."""
+"""Measurements in time after a gap from which on velocities are compared: accelerations over a gap are none."""
 
 _RESUMED = 2.0
 """Measurements in time after a gap, from which on differences of positions are compared again."""
+
+_NONE = 1e-3
+"""Noise of an acceleration that is none, rad²/s⁴: it makes a residual of some hundredths of a newton metre."""
 
 _QUIETER = 0.5
 """A source takes over where its variance is less than this fraction of the other's."""
@@ -83,26 +86,23 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
     Returns:
         Ticks between the velocities in force now and before.
     """
-    velocity.changed = 0
+    velocity.changed, velocity.of_positions = 0, 0
     if choice == _ROBOT or velocity.fresh != 0:
         velocity.qd[:], velocity.fresh = arm.qd, 0
         return since
     in_time = _IN_TIME[0] < since < _IN_TIME[1]
     velocity.ticks = velocity.ticks + 1.0 if in_time else 0.0
-    velocity.of_positions = 0
-    learning = in_time and untouched and velocity.ticks > _SETTLE_TICKS
-    velocity.seconds += since * dt if learning else 0.0
+    settled = velocity.ticks > _SETTLE_TICKS
+    velocity.seconds += since * dt if settled and untouched else 0.0
     known = velocity.seconds > max(_LEAST_S, _LEAST_TICKS * dt)
     for i in range(arm.q.shape[0]):
         by_positions = (arm.q[i] - velocity.q_before[i]) / (since * dt)
-        _compare(velocity, i, by_positions, arm.qd[i], since * dt, learning)
+        if settled:
+            _compare(velocity, i, by_positions, arm.qd[i], since * dt, untouched)
         source = choice
         if choice == _QUIETER_OF_TWO:
             source = _quieter(velocity.variance[i], velocity.source[i]) if known else velocity.source[i]
-        velocity.changed = 1 if source != velocity.source[i] else velocity.changed
-        velocity.source[i], velocity.qd[i] = source, arm.qd[i]
-        if source == _POSITIONS:
-            velocity.qd[i], velocity.of_positions = by_positions, 1
+        _take(velocity, i, source, by_positions if source == _POSITIONS else arm.qd[i])
         velocity.by_positions[i] = by_positions
     velocity.q_before[:], velocity.qd_before[:] = arm.q, arm.qd
     if velocity.ticks < _RESUMED and velocity.of_positions != 0:
@@ -112,18 +112,26 @@ def follow_velocities(velocity: Record, arm: Record, since: float, dt: float, un
 
 
 @inlined
+def _take(velocity: Record, i: int, source: int, qd: float) -> None:
+    """Take one source's velocity of joint i for that in force."""
+    velocity.changed = 1 if source != velocity.source[i] else velocity.changed
+    velocity.of_positions = 1 if source == _POSITIONS else velocity.of_positions
+    velocity.source[i], velocity.qd[i] = source, qd
+
+
+@inlined
 def is_of_middle(velocity: Record, i: int) -> bool:
     """Tell whether joint i's velocity is of the middle between two measurements, as a difference of positions is."""
     return velocity.source[i] == _POSITIONS
 
 
 @inlined
-def _compare(velocity: Record, i: int, by_positions: float, by_robot: float, dt: float, learning: bool) -> None:
+def _compare(velocity: Record, i: int, by_positions: float, by_robot: float, dt: float, untouched: bool) -> None:
     """Follow the noise in the acceleration of joint i by either velocity."""
     filters, variance = velocity.filters[i], velocity.variance[i]
     by_robot = _within_band(filters[_ROBOT], (by_robot - velocity.qd_before[i]) / dt, dt)
     by_positions = _within_band(filters[_POSITIONS], (by_positions - velocity.by_positions[i]) / dt, dt)
-    if learning:
+    if untouched:
         gain = dt / min(velocity.seconds, _MEMORY_S)
         variance[_ROBOT] += gain * (by_robot * (by_robot - by_positions) - variance[_ROBOT])
         variance[_POSITIONS] += gain * (by_positions * (by_positions - by_robot) - variance[_POSITIONS])
@@ -141,6 +149,6 @@ def _within_band(filters: Vector, x: float, dt: float) -> float:
 
 @inlined
 def _quieter(variance: Vector, source: int) -> int:
-    """Return the source of less variance, (2,); the one in force where they hardly differ."""
+    """Return the source of less variance, (2,); the one in force where they hardly differ, or it has no noise."""
     other = _ROBOT if source == _POSITIONS else _POSITIONS
-    return other if variance[other] < _QUIETER * variance[source] else source
+    return other if variance[other] < _QUIETER * variance[source] and variance[source] > _NONE else source
