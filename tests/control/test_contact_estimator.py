@@ -74,6 +74,26 @@ def test_a_push_is_felt_with_its_link_its_force_and_its_place(arm, estimator, li
     assert_allclose(contact.force @ force / 30.0, 30.0, rtol=0.35)
 
 
+@pytest.mark.parametrize(
+    ("pushes", "several"),
+    [
+        ({5: (0.0, 30.0, 0.0)}, False),
+        ({3: (0.0, 25.0, 0.0)}, False),
+        ({3: (0.0, 30.0, 0.0), 6: (0.0, -30.0, 0.0)}, True),
+        ({4: (0.0, 30.0, 0.0), 7: (0.0, -25.0, 0.0)}, True),
+    ],
+    ids=["link 5", "link 3", "links 3 and 6", "links 4 and 7"],
+)
+def test_two_contacts_that_no_single_one_explains_are_told_from_one(arm, estimator, pushes, several):
+    torque = sum(push_on(arm, link, force)[0] for link, force in pushes.items())
+    feel(estimator, still(arm), 500)
+    assert not estimator.step(still(arm)).several
+    contact = feel(estimator, still(arm, torque), 300)
+    assert contact.touched
+    assert contact.several is several
+    assert not feel(estimator, still(arm), 500).several
+
+
 def test_places_are_likeliest_first_and_sum_up_to_the_fraction(arm, estimator):
     torque, _ = push_on(arm, 5, (0.0, 30.0, 0.0))
     feel(estimator, still(arm), 500)

@@ -184,6 +184,7 @@ def _report_touch(state: Record, out: Record) -> None:
     """Report what touches arm or tool, and where."""
     touch, place = state.touch, state.localisation
     out.kind, out.probability = touch.kind, touch.probability
+    out.several = 1 if touch.touching != 0 and place.left_over > 1.0 else 0
     if touch.touching != 0 and place.best >= 0:
         out.link = min(place.link, state.arm.q.shape[0])
         out.point[:], out.force[:] = place.point, place.force

@@ -25,6 +25,9 @@ _GRID_M = 0.012
 _LEVER_M = 0.5
 """Lever arm by which a torque is taken for a force, where no more than its size matters."""
 
+_Z_99 = 2.3263
+"""A normal distribution exceeds so many standard deviations once in a hundred."""
+
 _LOGISTIC = 1.702
 """Of a logistic distribution that is nearly the normal one."""
 
@@ -203,3 +206,29 @@ def force_into(handle: Record, index: int, torque: Vector, known: Uncertainty, p
     link = point_into(handle, index, n, point, normal)
     constant = _information(handle, torque, known, min(link, n), G, h)
     return constant + _evidence(G, h, point, normal, link > n, A, b, force)
+
+
+@compiled
+def left_over(handle: Record, index: int, torque: Vector, known: Uncertainty, point: Vector, force: Vector) -> float:
+    """Return what of a torque the likeliest force at a place leaves over, Σ (τ − J_pᵀ f)² / (σ² + s²).
+
+    Where that is the place it is about n − 3 large. Point and force are filled as by `force_into`.
+    """
+    n, squared = torque.shape[0], 0.0
+    force_into(handle, index, torque, known, point, force)
+    joints = min(link_of(handle, index, n), n)
+    xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
+    for i in range(n):
+        o, a, left = xanchor[i], xaxis[i], torque[i]
+        if i < joints:
+            x, y, z = point[0] - o[0], point[1] - o[1], point[2] - o[2]
+            left -= a[0] * (y * force[2] - z * force[1])
+            left -= a[1] * (z * force[0] - x * force[2]) + a[2] * (x * force[1] - y * force[0])
+        squared += left * left / (known.sigma[i] * known.sigma[i] + known.moment_variance)
+    return squared
+
+
+@compiled
+def most_by_noise(free: float) -> float:
+    """Return what a sum of so many squared standard normal numbers exceeds once in a hundred; Wilson & Hilferty 1931."""
+    return free * (1.0 - 2.0 / (9.0 * free) + _Z_99 * math.sqrt(2.0 / (9.0 * free))) ** 3

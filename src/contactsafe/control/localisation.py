@@ -10,7 +10,15 @@ import math
 import numpy as np
 
 from contactsafe.control.baseline import distance
-from contactsafe.control.evidence import Uncertainty, compare_into, force_into, link_of, point_into
+from contactsafe.control.evidence import (
+    Uncertainty,
+    compare_into,
+    force_into,
+    left_over,
+    link_of,
+    most_by_noise,
+    point_into,
+)
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_vector
@@ -30,6 +38,9 @@ _POSTURES = 5.0
 
 _ABOUT_M, _NEGLIGIBLE = 0.05, 0.02
 """Point and force are a mean over what is so near to the best point, and no less probable than this part of it."""
+
+_CHECK = 0.2
+"""Of what a sweep leaves over that is taken over at once: contacts that come together look like several at first."""
 
 _NEVER = -1e9
 
@@ -53,6 +64,7 @@ def localisation_dtype(n: int) -> np.dtype:
             ("best", _i),  # most probable point of the most probable link, −1 for none
             ("link", _i),  # that link, n + 1 for the tool, 0 for none
             ("tool_probability", _f),  # of the tool
+            ("left_over", _f),  # of the torque at the best point, over the most that noise leaves; smoothed
             ("force", _f, (3,)),  # of the environment at the best point, world, N
             ("point", _f, (3,)),  # the best point, world, m
         ]
@@ -64,7 +76,7 @@ def forget_place(place: Record, q: Vector) -> None:
     """Begin with a contact that may be anywhere."""
     place.memory[:], place.postures, place.next, place.turn, place.q[:] = 0.0, 0.0, 0, 0, q
     place.best, place.link, place.tool_probability = -1, 0, 0.0
-    place.force[:], place.point[:] = 0.0, 0.0
+    place.force[:], place.point[:], place.left_over = 0.0, 0.0, 0.0
 
 
 @compiled
@@ -93,6 +105,7 @@ def localise(
     place.turn += 1
     _remember(place, q, points)
     _conclude(place, handle, place.torque, of_sweep, points)
+    _check(place, handle, of_sweep)
 
 
 @compiled
@@ -130,6 +143,16 @@ def _conclude(place: Record, handle: Record, torque: Vector, known: Uncertainty,
         if link_of(handle, index, n) == link and place.log[index] > best:
             best, place.best = place.log[index], index
     _average(place, handle, torque, known, points)
+
+
+@compiled
+def _check(place: Record, handle: Record, known: Uncertainty) -> None:
+    """Follow how well the best point explains the torque at all; a single contact leaves n − 3 numbers free."""
+    free = place.torque.shape[0] - 3.0
+    if free < 1.0:
+        return
+    left = left_over(handle, place.best, place.torque, known, stack_vector(3), stack_vector(3)) / most_by_noise(free)
+    place.left_over += (1.0 if place.turn == 1 else _CHECK) * (left - place.left_over)
 
 
 @compiled

@@ -129,6 +129,7 @@ def output_dtype(n: int) -> np.dtype:
             ("kind", _i),  # key of KINDS
             ("link", _i),  # 1 … n, 0 for none
             ("probability", _f),  # of the kind
+            ("several", _i),  # whether no single contact explains the torques
             *(
                 (name, _f, (3,)) for name in ("point", "force")
             ),  # where, m, NaN where unknown, and what is there, N; world

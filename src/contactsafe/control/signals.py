@@ -63,6 +63,8 @@ class Contact(NamedTuple):
             `ContactEstimator.places()` gives the others that explain the torques.
         force: of the environment there, as far as joint torques tell it, world, (3,), N.
         bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
+        several: whether no single contact explains the torques, so that arm or tool is touched in two places at least;
+            by `ContactEstimator` alone. Two contacts often do look like one: no is no proof.
     """
 
     in_contact: bool
@@ -73,6 +75,7 @@ class Contact(NamedTuple):
     point: np.ndarray
     force: np.ndarray
     bridged: int = 0
+    several: bool = False
 
     @property
     def touched(self) -> bool:
@@ -128,6 +131,7 @@ def contact_of(out: dict[str, np.ndarray], placed: bool) -> Contact:
         point=out["point"].copy() if placed else np.full(3, np.nan),
         force=out["force"].copy() if placed else np.full(3, np.nan),
         bridged=int(out["bridged"]),
+        several=placed and bool(out["several"]),
     )
 
 

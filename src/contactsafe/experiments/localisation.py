@@ -131,9 +131,9 @@ def _run_batch(
 def _named(figures: Mapping[str, float], contacts: int, when: str) -> dict[str, float]:
     """Return figures under the names of their metrics: what has an aim of its own has a name of its own."""
     if contacts > 1:
-        kept = ("felt", "felt_early", "link", "force_n", "path_cm", "limit_told")
+        kept = ("felt", "felt_early", "link", "force_n", "path_cm", "told", "limit_told")
         of_nearest = {f"nearest_{key}": figures.get(key, math.nan) for key in NEAREST}
-        return {key: figures[key] for key in kept} | of_nearest
+        return {key: figures.get(key, math.nan) for key in kept} | of_nearest
     return {key.replace("within_5_cm", "within_5_cm_moved") if when == MOVED else key: x for key, x in figures.items()}
 
 
@@ -173,6 +173,7 @@ def _figures(estimator: ContactEstimator, contact: Contact, scene: TouchScene, q
     _, _, force = min(true, key=lambda one: float(np.linalg.norm(contact.point - one[1])))
     return {
         "tool_named": float(contact.kind == "tool"),
+        "told": float(contact.several),
         **point_metrics(contact.point, contact.link, touched),
         **set_metrics(links, points, spacing(arm.places), touched),
         **force_metrics(contact.force, force),

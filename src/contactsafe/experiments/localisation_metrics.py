@@ -41,6 +41,7 @@ METRICS = (
     Metric("nearest_point_error_cm", "best point, from the nearest true one", "cm", main=True),
     Metric("nearest_within_5_cm", "best point within 5 cm of it, mean", "%", 100.0, main=True, mean=True),
     Metric("nearest_link_right", "link either of the two, mean", "%", 100.0, mean=True),
+    Metric("told", "told that no single contact explains it, mean", "%", 100.0, mean=True),
     Metric("nearest_in_set", "either true point in the 95 % set, mean", "%", 100.0, main=True, mean=True),
 )  # fmt: skip
 

@@ -30,7 +30,7 @@ _NOTE = (
     "alone, nothing else being unknown; moved, from three postures and a force that turns with its link. The limit's "
     "force is that where the place is known. Figures but the first are of contacts that were felt. In the set: one of "
     "its places, on the touched link, is no further from the true point than the places are apart. The estimator takes "
-    "every contact for one, and says nothing of how many there are."
+    "every contact for one, and tells where no single one explains the torques."
 )
 
 
