@@ -17,8 +17,8 @@ def _start(noises, allowed):
 
 
 @compiled
-def _follow(noises, torque, steps, untouched, allowed):
-    follow_noise(noises[0], torque, np.zeros(torque.shape[0]), 0, steps[0], untouched, allowed)
+def _follow(noises, torque, uncertainty, of_positions, steps, untouched, allowed):
+    follow_noise(noises[0], torque, uncertainty, of_positions, steps[0], untouched, allowed)
 
 
 @compiled
@@ -26,7 +26,7 @@ def _left(noises, i, allowed):
     return noise_left(noises[0], i, allowed)
 
 
-def followed(torques, touched=None, allowed=ALLOWED_NM, noises=None):
+def followed(torques, touched=None, allowed=ALLOWED_NM, noises=None, uncertain=0.0, of_positions=0):
     """Run over raw external torques, (T, n), N m; give the noise record, and its bandwidths."""
     steps = np.zeros(1, step_dtype)
     steps["dt"] = 0.001
@@ -36,7 +36,8 @@ def followed(torques, touched=None, allowed=ALLOWED_NM, noises=None):
         _start(noises, allowed)
     bandwidths = []
     for k, torque in enumerate(torques):
-        _follow(noises, torque, steps, touched is None or not touched[k], allowed)
+        uncertainty = np.full(len(torque), uncertain)
+        _follow(noises, torque, uncertainty, of_positions, steps, touched is None or not touched[k], allowed)
         bandwidths.append(float(noises["bandwidth"][0]))
     return noises, np.array(bandwidths)
 
@@ -65,6 +66,25 @@ def test_a_push_is_not_learned_while_it_is_known_and_hardly_before():
     assert (noises["sigma"] == sigma).all()
     _, bandwidths = followed(push[:50], noises=noises)  # of 2.5 N m, before it is found
     assert bandwidths[-1] > 0.9 * before[-1]
+
+
+def test_noise_is_not_forgotten_while_motion_hides_it():
+    noises, before = followed(white(6000, 3.0))
+    sigma = noises["sigma"].copy()
+    followed(white(8000, 3.0), noises=noises, uncertain=5.0)
+    assert (noises["sigma"] > 0.8 * sigma).all()
+    assert before[-1] < 1.0
+
+
+def test_what_a_model_may_be_wrong_by_is_no_noise():
+    still, moving = (followed(white(6000, 3.0), uncertain=uncertain)[0]["sigma"].max() for uncertain in (0.0, 0.2))
+    assert moving < still
+
+
+def test_velocities_from_positions_have_less_bandwidth_however_quiet():
+    """One position that is read late, or was filled in, shows: a log whose lost rows were interpolated did."""
+    _, bandwidths = followed(np.zeros((800, 2)), of_positions=1)
+    assert bandwidths.max() == pytest.approx(0.6)
 
 
 def test_what_changes_slowly_is_no_noise():

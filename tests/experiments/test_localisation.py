@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from contactsafe import presets
 from contactsafe.experiments.config import ExperimentConfig
-from contactsafe.experiments.localisation import TWO, for_estimation, localisation
+from contactsafe.experiments.localisation import TWO, localisation
 from contactsafe.experiments.localisation_metrics import METRICS, force_metrics, point_metrics, set_metrics
 from contactsafe.experiments.onsets import pushed_links
 from contactsafe.experiments.registry import ENTRIES
@@ -245,10 +244,6 @@ def test_a_force_is_right_within_the_larger_of_15_percent_and_2_n(force, within,
     found = force_metrics(np.array(force, float), np.array([0.0, 0.0, 10.0]))
     assert (found["force_within"], found["force_size_within"]) == (within, size_within)
     assert found["force_error_deg"] == pytest.approx(math.degrees(math.atan2(force[1], force[2])))
-
-
-def test_the_default_is_looked_at_as_the_estimator_has_it():
-    assert for_estimation(presets.safe()) == presets.sensitive()
 
 
 def test_the_experiment_counts_its_trials_and_shows_the_limit():

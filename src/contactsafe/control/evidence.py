@@ -230,5 +230,5 @@ def left_over(handle: Record, index: int, torque: Vector, known: Uncertainty, po
 
 @compiled
 def most_by_noise(free: float) -> float:
-    """Return what a sum of so many squared standard normal numbers exceeds once in a hundred; Wilson & Hilferty 1931."""
+    """Return what so many squared standard normal numbers exceed once in a hundred; Wilson & Hilferty 1931."""
     return free * (1.0 - 2.0 / (9.0 * free) + _Z_99 * math.sqrt(2.0 / (9.0 * free))) ** 3

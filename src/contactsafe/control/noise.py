@@ -22,6 +22,9 @@ _LEARN, _LEARN_S, _KEEP_S = 0.3, 0.03, 1.0
 """Time in which what is believed of the noise may change by a factor of e: a fraction of that for which it was
 measured, and at least and at most."""
 
+_GUESSED_S = 1.0
+"""Until it was measured for so long it is rather a guess, which motion may lower as well."""
+
 _PRIOR, _FLOOR = 4.0, 0.2
 """Of what is allowed: the noise that is believed in at first, and the least that is told from none."""
 
@@ -91,10 +94,13 @@ def _learn(noise: Record, model_uncertainty: Vector, dt: float, least_nm: float)
     """
     noise.seconds += dt
     factor = math.exp(dt / min(max(_LEARN * noise.seconds, _LEARN_S), _KEEP_S))
+    guessed = noise.seconds < _GUESSED_S
     for i in range(noise.sigma.shape[0]):
         seen = abs(noise.residual[i] - noise.slow[i]) - model_uncertainty[i]
-        noise.sigma[i] *= factor if seen > _MEDIAN * noise.sigma[i] else 1.0 / factor
-        noise.sigma[i] = max(noise.sigma[i], least_nm)
+        if seen > _MEDIAN * noise.sigma[i]:
+            noise.sigma[i] *= factor
+        elif guessed or model_uncertainty[i] < noise.sigma[i]:  # or motion hides the noise, and would have it forgotten
+            noise.sigma[i] = max(noise.sigma[i] / factor, least_nm)
 
 
 @inlined

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contactsafe.control.config import ControllerConfig
 from contactsafe.control.contact_estimator import ContactEstimator
 from contactsafe.control.signals import Contact, Measurement
 from contactsafe.experiments.collision_motions import scene_rng
@@ -74,10 +73,7 @@ def localisation(config: ExperimentConfig, progress: Progress | None = None) -> 
     """
     arm = config.arm
     surface = dense_surface(arm)
-    estimators = {
-        name: ContactEstimator(arm, for_estimation(controller))
-        for name, controller in reporting(config.controllers).items()
-    }
+    estimators = {name: ContactEstimator(arm, controller) for name, controller in reporting(config.controllers).items()}
     trials: list[Trial] = []
     for start in range(0, config.trials, _BATCH):
         for plant in config.plants:
@@ -99,11 +95,6 @@ ENTRY = Entry(
     trials=100,
     takes=("plants",),
 )
-
-
-def for_estimation(controller: ControllerConfig) -> ControllerConfig:
-    """Return a configuration with what signals of real joints need: `safe()` becomes `sensitive()`."""
-    return controller.with_(velocity_source="quieter", residual_noise_nm=0.15)
 
 
 def _scenarios(contacts: int) -> list[tuple[str, str]]:
