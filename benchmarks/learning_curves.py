@@ -15,6 +15,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+_WIDTH = 150
+"""Characters that a line of the legend has room for."""
+
 SUCCESS = 0.9
 """Of the last hundred episodes: the task counts as learned."""
 
@@ -82,7 +85,8 @@ def draw(curves: dict[Path, Curve], out: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     if len(settings) > 1:
         lines = [by_minutes.plot([], [], color=f"C{k}")[0] for k in range(len(settings))]
-        figure.legend(lines, settings, loc="outside lower center", ncols=min(len(settings), 4), frameon=False)
+        columns = max(_WIDTH // max(map(len, settings)), 1)
+        figure.legend(lines, settings, loc="outside lower center", ncols=columns, frameon=False)
     figure.savefig(out, dpi=100)
 
 
