@@ -25,6 +25,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.late_worlds import FROZEN, LOST, SEEN, LatePlayback, LateWorlds
 from contactsafe.experiments.motions import Playback
+from contactsafe.logs.clearance import Clearance
 from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
@@ -75,6 +76,11 @@ def evaluate_nominal(nominal):
     found = np.zeros(3), np.zeros((3, 3)), np.zeros((6, 7))
     forward_kinematics(nominal.handle, np.linspace(-0.5, 0.5, 7), *found)
     return list(found)
+
+
+def clear(clearance):
+    postures = cs.robots.panda().home + np.linspace(0.0, 1.5, 5)[:, None]
+    return [np.array([clearance.is_free(posture[None]) for posture in postures])]
 
 
 def solve(ik):
@@ -320,6 +326,7 @@ def plotter():
 ACTORS = {
     "Arm": (cs.robots.panda, evaluate_arm),
     "NominalModel": (lambda: cs.robots.panda().nominal(), evaluate_nominal),
+    "Clearance": (lambda: Clearance(cs.robots.panda(), 0.0), clear),
     "InverseKinematics": (lambda: InverseKinematics(cs.robots.panda()), solve),
     "Controller": (begun(controller, drive), drive),
     "ContactEstimator": (begun(estimator, feel), feel),

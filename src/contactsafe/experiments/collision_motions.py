@@ -124,8 +124,8 @@ def sample_motion(arm: Arm, seed: int, slides: bool | None = None, holds: bool |
         UnreachableError: the arm reaches none.
     """
     rng = scene_rng(seed, 0)
-    sliding, holding, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
-    slides, holds = sliding if slides is None else slides, holding if holds is None else holds
+    sliding, at_rest, limited = rng.random() < 0.4, rng.random() < 0.25, rng.random() < 0.5
+    slides, holds = sliding if slides is None else slides, at_rest if holds is None else holds
     speed = rng.uniform(0.1, 0.3 if slides else 0.5)
     stiffness = np.repeat([math.exp(rng.uniform(math.log(75), math.log(250))), rng.uniform(300, 700)], 3)
     meets_at = rng.uniform(0.25, 0.6)

@@ -69,7 +69,7 @@ class TouchScene:
     """A motion of which the beginning is followed in contact, and one contact or two.
 
     Attributes:
-        motion: where the tool is and which way it goes.
+        motion: where the tool is and where it goes.
         path_m: how far.
         ramp_ms: time from nothing to full force.
         touches: on different links.

@@ -108,7 +108,7 @@ class PolicyConfig:
     seed: int = 0
     threads: int = 1
     encoder_threads: int = 2
-    calibration: Path | None = None
+    calibration: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none)")] = None
 
     def __post_init__(self) -> None:
         """Refuse numbers with which nothing can be trained."""
