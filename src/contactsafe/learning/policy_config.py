@@ -77,7 +77,7 @@ class PolicyConfig:
         seed: of weights, exploration and episodes.
         threads: torch's. More than one crawls as soon as anything else wants a core.
         encoder_threads: ONNX Runtime's.
-        calibration: what `contactsafe identify` wrote of the robot; None for the task's arm by its description.
+        calibration: what `contactsafe identify` wrote of the robot; without it the task's arm is as described.
     """
 
     algorithm: ClassVar[str]
