@@ -159,7 +159,7 @@ def test_what_a_log_does_not_show_is_named_with_how_the_joint_moved(arm, motion)
     ("rows", "text"),
     [
         (slice(0, 1500), "is 1.5 s long; record 2 s or more"),
-        (slice(0, None, 40), "rows a second; record 50 or more"),
+        (slice(0, None, 40), "rows a second by its time; record 50 to 20000$"),
     ],
 )
 def test_too_little_is_refused(arm, log, rows, text):
@@ -198,6 +198,22 @@ def test_missing_rows_are_left_out(arm, log):
     thin = Log("gaps", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
     known = identify(thin, arm).calibration
     assert_allclose(known.sensor.bias, BIAS, rtol=0.05, atol=0.01)
+
+
+def test_a_log_that_loses_rows_in_every_window_is_refused(arm, log):
+    """20 ms in every 140 are missing: smoothed into their neighbours, no window of 100 ms is without them."""
+    kept = np.mod(log.time, 0.14) > 0.02
+    thin = Log("lossy", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
+    with pytest.raises(InvalidInputError, match="lossy: rows are missing in all but 0 windows"):
+        identify(thin, arm)
+
+
+def test_two_runs_days_apart_are_identified_as_one(arm, log):
+    """A year of rows at 1 kHz would not fit into any memory."""
+    later = log.time + (log.time > 6.0) * 3.2e7
+    known = identify(free(log, time=later, command=None), arm).calibration
+    assert_allclose(known.sensor.bias, BIAS, rtol=0.05, atol=0.01)
+    assert_load(known.payload)
 
 
 def test_a_joint_that_sticks_is_no_contact(arm, motion):

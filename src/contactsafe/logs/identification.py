@@ -8,7 +8,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.logs.fitting import Fit, fit
 from contactsafe.logs.log import Log
 from contactsafe.logs.smoothing import Signals, signals_of
-from contactsafe.logs.soundness import refuse_contact, refuse_unfit
+from contactsafe.logs.soundness import refuse_contact, refuse_gaps, refuse_unfit
 from contactsafe.logs.stiction import breakaway_torque
 from contactsafe.robot.arm import Arm, require_arm
 from contactsafe.robot.calibrated import can_carry, tool_name
@@ -119,6 +119,7 @@ def identify(log: Log, arm: Arm) -> Identification:
     require_arm(arm)
     refuse_unfit(log, arm)
     signals, fits = signals_of(log), {}
+    refuse_gaps(log, signals)
     carried = None
     if signals.torque is not None:
         fits["sensor"] = fit(arm, signals, signals.torque, behind_gears=True)
@@ -127,7 +128,7 @@ def identify(log: Log, arm: Arm) -> Identification:
         fits["losses"] = fit(arm, signals, signals.command, behind_gears=False, carried=carried)
     refuse_contact(log, arm, next(iter(fits.values())))
     found = Identification(log, arm, _calibration(log, arm, signals, fits), fits, signals)
-    if not found.fits_already and found.reduction < 1.0 - _WORSE:
+    if not found.fits_already and not found.reduction >= 1.0 - _WORSE:  # NaN as well
         raise InvalidInputError(
             f"{log.source}: what its first half shows makes the residual of the second {-found.reduction:.0%} larger; "
             "record a longer motion in which every joint moves to and fro, see `contactsafe record`"

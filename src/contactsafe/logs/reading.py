@@ -72,7 +72,8 @@ def read_log(
     time = given.pop("time", None)
     if rate_hz is not None:
         time = np.arange(len(given["q"])) / rate_hz
-    return Log(path.name, np.asarray(time).reshape(-1), **given)
+    columns_of = {known: values[:, None] if values.ndim == 1 else values for known, values in given.items()}
+    return Log(path.name, np.asarray(time).reshape(-1), **columns_of)
 
 
 def _pick(source: str, arrays: Mapping[str, np.ndarray], known: str, name: str | None) -> np.ndarray | None:
