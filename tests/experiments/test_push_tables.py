@@ -18,6 +18,8 @@ def trial(controller, seed, mm, scenario=WITH_WRENCH, **more):
         "joint_speed_peak_rad_s": 0.2,
         "report_ms": math.nan,
         "reject_ms": math.nan,
+        "never_rejected": 1.0,
+        "reported_early": 0.0,
         "link": 5.0,
         "ramp_ms": 100.0,
         "angle_deg": 0.0,
@@ -47,6 +49,12 @@ def test_verdict_sums_up_displacements_and_ratios():
     assert found["displacement, largest"] == 60.0
     assert found["controller / vices, median"] == pytest.approx(0.4)
     assert found["2 s after release, largest"] == pytest.approx(6.0)
+
+
+def test_contacts_reported_before_the_push_are_counted_beside_those_never_named():
+    found = figures(tables([2.0, 4.0], [10.0, 10.0], reported_early=1.0, never_rejected=0.0)["verdict"])
+    assert found["reported before the onset"] == 2
+    assert found["never named a push"] == 0
 
 
 def test_the_baseline_against_itself_is_never_worse():
