@@ -11,8 +11,10 @@ from tests.robot.worlds import SIX
 
 from contactsafe import Payload, robots
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.logs import carried
 from contactsafe.logs.excitation import excitation
 from contactsafe.logs.identification import identify
+from contactsafe.logs.identified import results_of
 from contactsafe.logs.log import Log
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.payload import carrying
@@ -153,6 +155,70 @@ def test_what_a_log_does_not_show_is_named_with_how_the_joint_moved(arm, motion)
     said = identify(free(log, torque=None), arm).not_shown("losses")
     assert any("viscous" in one and "joint 5, which moved by" in one for one in said)
     assert not any("joint 1," in one for one in said)
+
+
+def test_a_payload_that_the_file_cannot_hold_is_part_of_nothing(arm, log, monkeypatch):
+    """One that seems too far from the tool point: friction and check are those without it, and it is said why."""
+    monkeypatch.setattr(carried, "_FAR_M", 0.001)
+    found = identify(log, arm)
+    assert found.calibration.payload is None
+    assert all(not fit.unknowns.load and not fit.load().any() for fit in found.fits.values())
+    assert found.carried.left_out == "a payload of 0.8 kg was left out: it would be 0.06 m from the tool point"
+    note = results_of(found).tables[0].note
+    assert note.endswith("A payload of 0.8 kg was left out: it would be 0.06 m from the tool point.")
+    assert "payload" not in [table.name for table in results_of(found).tables]
+
+
+def test_a_payload_without_its_tensor_is_what_all_else_is_identified_with(arm, log, monkeypatch):
+    whole = identify(log, arm)
+    monkeypatch.setattr(carried, "can_carry", lambda arm, load: not load.inertia.any())
+    found = identify(log, arm)
+    assert_load(found.calibration.payload)
+    assert not found.calibration.payload.inertia.any()
+    for fit in found.fits.values():
+        assert_allclose(fit.load(), found.carried.parameters(arm))
+    assert_allclose(found.before, whole.before)
+    assert "counts as a point" in results_of(found).tables[0].note
+    (row,) = next(table for table in results_of(found).tables if table.name == "payload").as_records()
+    assert row["± mass"] > 0.0
+
+
+def test_what_a_file_holds_is_what_was_identified_with(arm, log):
+    found = identify(free(log, command=None), arm)
+    assert_allclose(found.carried.parameters(arm), found.fit.load(), atol=1e-9)
+    assert found.carried.left_out == ""
+
+
+def test_a_sensors_errors_may_have_either_sign(arm, log):
+    """Torque sensors that show less than there is when a joint is fast, and hysteresis of the wrong sign."""
+    shown = log.torque - 0.1 * log.qd - 0.2 * np.tanh(20.0 * log.qd)
+    known = identify(free(log, torque=shown, command=None), arm).calibration
+    assert_allclose(known.sensor.dry, -0.2, rtol=0.15)
+    assert_allclose(known.sensor.viscous, -0.1, rtol=0.4)
+    told = robots.calibrated(arm, known)
+    assert (told.sensor_drag[:, 2] < 0.0).all()
+
+
+def test_what_is_kept_at_zero_is_not_shown_surely(arm, motion):
+    """A joint that hardly moves shows friction of either sign: what would be negative is no 0 ± 0."""
+    q, qd = motion.q.copy(), motion.qd.copy()
+    q[:, 4], qd[:, 4] = arm.home[4] + 0.01 * (q[:, 4] - arm.home[4]), 0.01 * qd[:, 4]
+    log = logged(arm, motion._replace(q=q, qd=qd), friction=lambda qd: -0.3 * np.tanh(20.0 * qd))
+    found = identify(free(log, torque=None), arm)
+    zero = found.fit.of("viscous")[4] < 1e-6
+    assert zero
+    assert found.fit.deviation("viscous")[4] > 0.5 * found.fit.problem.spread[found.fit.unknowns.of("viscous")][4]
+    assert any("viscous" in one and "joint 5" in one for one in found.not_shown("losses"))
+
+
+def test_windows_in_which_a_joint_sticks_are_no_part_of_the_check(arm, motion):
+    """What holds a joint at rest is whatever is asked of it: 3 N m at both ends of the motion, left by any fit."""
+    held = np.where(np.abs(motion.qd) < 1e-3, 3.0, 0.0)
+    log = logged(arm, motion, friction=lambda qd: 1.5 * np.sign(qd))
+    found = identify(free(log, torque=None, command=log.command + held), arm)
+    assert (found.after < 0.2).all()
+    counts = found.fit.problem.counts[len(found.fit.check) // 2 :]
+    assert not counts.all()
 
 
 @pytest.mark.parametrize(
