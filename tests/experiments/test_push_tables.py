@@ -81,7 +81,7 @@ def test_holding_and_moving_have_ratios_of_their_own():
 
 def test_what_was_never_reported_has_no_time_and_is_counted():
     trials = [trial("vices", 0, 5.0), trial("vices", 1, 5.0)]
-    trials += [trial("safe", 0, 5.0, reject_ms=80.0, report_ms=20.0), trial("safe", 1, 5.0)]
+    trials += [trial("safe", 0, 5.0, reject_ms=80.0, report_ms=20.0, never_rejected=0.0), trial("safe", 1, 5.0)]
     verdict, _ = push_tables(compared(trials, "vices"), "vices", "again {seed}")
     found = figures(verdict)
     assert (found["onset to report, median"], found["onset to 'push', median"]) == (20.0, 80.0)

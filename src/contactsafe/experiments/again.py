@@ -40,5 +40,5 @@ def same_arm(one: Arm, other: Arm) -> bool:
     """Tell whether two arms are the same in all that a simulation of them goes by."""
     if (one.name, one.n, one.description, one.tool) != (other.name, other.n, other.description, other.tool):
         return False
-    mine, others = (as_numbers(arm) | model_numbers(arm) for arm in (one, other))
+    mine, others = ({**as_numbers(arm), **model_numbers(arm)} for arm in (one, other))
     return all(np.array_equal(value, others[name]) for name, value in mine.items())

@@ -174,6 +174,9 @@ def _solve(unknowns: Unknowns, problem: Problem) -> Solution:
             where = unknowns.of(name)
             below[where] = solution.value[where] < 0.0
         if not (below & ~pinned).any():
+            if unknowns.smooth:  # their sum is told, for which both must be of one solution
+                dry, smooth = unknowns.of("coulomb"), unknowns.of("smooth")
+                pinned[dry] = pinned[smooth] = pinned[dry] | pinned[smooth]
             either = pinned[:, None] | pinned
             return solution._replace(covariance=np.where(either, free.covariance, solution.covariance))
         pinned |= below

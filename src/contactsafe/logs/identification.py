@@ -72,7 +72,7 @@ class Identification:
     @property
     def _moved(self) -> np.ndarray:
         """Which joints count anywhere in the second half, (n,)."""
-        return _second(self.fit.problem.counts).any(axis=0)
+        return np.any(_second(self.fit.problem.counts), axis=0)
 
     @property
     def reduction(self) -> float:
@@ -133,11 +133,14 @@ def identify(log: Log, arm: Arm) -> Identification:
     refuse_unfit(log, arm)
     signals, fits = signals_of(log), dict[str, Fit]()
     refuse_gaps(log, signals)
-    name, torque = ("losses", signals.command) if signals.torque is None else ("sensor", signals.torque)
-    fits[name], carried = _fit_with_payload(arm, signals, torque, name == "sensor")
-    if signals.torque is not None and signals.command is not None:
+    carried = Carried(None)
+    if signals.torque is not None:
+        fits["sensor"], carried = _fit_with_payload(arm, signals, signals.torque, behind_gears=True)
+    if signals.command is not None and not fits:
+        fits["losses"], carried = _fit_with_payload(arm, signals, signals.command, behind_gears=False)
+    elif signals.command is not None:
         fits["losses"] = fit(arm, signals, signals.command, behind_gears=False, carried=carried.parameters(arm))
-    refuse_contact(log, arm, fits[name])
+    refuse_contact(log, arm, next(iter(fits.values())))
     found = Identification(log, arm, _calibration(log, arm, signals, fits, carried), fits, signals, carried)
     if not found.fits_already and not found.reduction >= 1.0 - _WORSE:  # NaN as well
         raise InvalidInputError(
