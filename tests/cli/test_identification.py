@@ -96,7 +96,7 @@ COMMANDS = (
     "experiment disturbance",
     "demo",
     "replay log.npz",
-    "train ppo --out run",
+    "train ppo --task insertion --num-envs 8 --out run",
 )
 
 

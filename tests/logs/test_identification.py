@@ -14,7 +14,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.logs import carried
 from contactsafe.logs.excitation import excitation
 from contactsafe.logs.fitting import _solve
-from contactsafe.logs.identification import identify
+from contactsafe.logs.identification import Identification, identify
 from contactsafe.logs.identified import results_of
 from contactsafe.logs.least_squares import Problem
 from contactsafe.logs.log import Log
@@ -285,6 +285,13 @@ def test_a_log_that_loses_rows_in_every_window_is_refused(arm, log):
     thin = Log("lossy", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
     with pytest.raises(InvalidInputError, match="lossy: rows are missing in all but 0 windows"):
         identify(thin, arm)
+
+
+def test_a_check_that_came_to_nothing_is_none_that_was_passed(arm, log, monkeypatch):
+    """It was '0% smaller: nan', and a file was saved."""
+    monkeypatch.setattr(Identification, "after", property(lambda found: np.full(7, np.nan)))
+    with pytest.raises(InvalidInputError, match="the second no number; record a longer motion"):
+        identify(free(log, command=None), arm)
 
 
 def test_two_runs_days_apart_are_identified_as_one(arm, log):

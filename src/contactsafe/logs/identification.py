@@ -143,8 +143,9 @@ def identify(log: Log, arm: Arm) -> Identification:
     refuse_contact(log, arm, next(iter(fits.values())))
     found = Identification(log, arm, _calibration(log, arm, signals, fits, carried), fits, signals, carried)
     if not found.fits_already and not found.reduction >= 1.0 - _WORSE:  # NaN as well
+        worse = f"{-found.reduction:.0%} larger" if np.isfinite(found.reduction) else "no number"
         raise InvalidInputError(
-            f"{log.source}: what its first half shows makes the residual of the second {-found.reduction:.0%} larger; "
+            f"{log.source}: what its first half shows makes the residual of the second {worse}; "
             "record a longer motion in which every joint moves to and fro, see `contactsafe record`"
         )
     return found
