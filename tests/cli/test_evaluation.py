@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 from tests.cli.mistakes import mistake
 
 from contactsafe.cli import main
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks import TASKS
 from contactsafe.tasks.wiping.figures import FIGURES
 
@@ -28,6 +30,16 @@ def test_evaluate_explains_every_figure_it_prints(bundle, capsys):
     assert asked.startswith(f"task wiping, policy {bundle}, seed 3, controller safe, pushed False, boards strokes")
     assert [row.split()[0] for row in rows] == [figure.name for figure in FIGURES]
     assert all(figure.doc in row for figure, row in zip(FIGURES, rows, strict=True))
+
+
+def test_evaluate_says_with_which_calibration(tmp_path, capsys):
+    noise, path = np.full(7, 0.1), str(tmp_path / "robot.json")
+    Calibration("panda", "wiper", noise, noise, noise).save(path)
+    words = ["evaluate", "--scripted", "random", "--episodes", "1", "--calibration", path]
+    assert main(words) == 0
+    assert f"seed 0, calibration {path}, controller safe" in capsys.readouterr().out
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["calibration"] == path
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -7,7 +7,8 @@ import pytest
 from tests.logs.plants import logged
 
 from contactsafe import robots
-from contactsafe.cli import main
+from contactsafe.cli import experiments, main
+from contactsafe.experiments import registry
 from contactsafe.logs.excitation import excitation
 from contactsafe.robot.calibration import Calibration
 
@@ -89,12 +90,49 @@ def test_replay_takes_it_and_the_residual_lies_about_nothing(file, tmp_path, cap
     assert middles[1] < 10.0
 
 
-@pytest.mark.parametrize("command", [["evaluate", "--episodes", "1"], ["experiment", "detection"], ["demo"]])
+COMMANDS = (
+    "evaluate --episodes 1 --scripted random",
+    "experiment detection",
+    "experiment disturbance",
+    "demo",
+    "replay log.npz",
+    "train ppo --task insertion --num-envs 8 --out run",
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_refuses_another_robots_calibration(file, tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
+    noise = np.full(7, 0.1)
+    Calibration("fr3", "franka hand", noise, noise, noise).save("robot.json")
+    assert main([*command.split(), "--calibration", "robot.json"]) == 1
+    assert "the calibration is of 'fr3' with 7 joints, the arm is 'panda' with 7" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_refuses_what_is_no_calibration(file, tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "robot.json").write_text("{}", encoding="utf-8")
-    assert main([*command, "--calibration", "robot.json"]) == 1
+    assert main([*command.split(), "--calibration", "robot.json"]) == 1
     assert "robot.json is no calibration; give what `contactsafe identify` wrote" in capsys.readouterr().err
+
+
+def test_a_calibration_is_read_once(tmp_path, monkeypatch):
+    """It was read for the task and again for the arm."""
+    noise, read = np.full(7, 0.1), []
+    known = Calibration("panda", "franka hand", noise, noise, noise)
+    monkeypatch.setattr(Calibration, "load", lambda path: read.append(path) or known)
+    asked = experiments.Options("disturbance", calibration=tmp_path / "robot.json")
+    config = experiments._config(asked, registry.by_name("disturbance"))
+    assert read == [tmp_path / "robot.json"]
+    assert config.arm.calibrated
+    assert config.arm_words == ("--calibration", str(tmp_path / "robot.json"))
+
+
+def test_record_says_for_which_robot_its_log_is_identified(tmp_path, capsys):
+    words = ["--robot", "fr3", "--tool", "flange"]
+    assert main(["record", *words, "--seconds", "6", "--rate", "50", "--out", str(tmp_path / "motion.csv")]) == 0
+    assert capsys.readouterr().out.endswith("Then: contactsafe identify LOG --robot fr3 --tool flange\n")
 
 
 def test_record_writes_a_motion_that_a_robot_can_follow(tmp_path, capsys):

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from tests.control.plant import UNTOUCHED, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
+from contactsafe.robot.friction import joint_friction
 
 INSTANT = {"compensation_gain": 1e6, "detection_gain": 1e6, "residual_cutoff_hz": math.inf}
 
@@ -61,6 +62,22 @@ def test_contact_lasts_until_it_is_well_below_the_threshold(panda):
     felt = Felt(panda, presets.paper().with_(release_fraction=0.5))
     modes = felt.feel(joint(3, 2.0)) + felt.feel(joint(3, 0.76), 200) + felt.feel(joint(3, 0.74), 1)
     assert modes == [True] * 201 + [False]
+
+
+def test_viscous_and_dry_friction_raise_the_threshold_and_a_constant_does_not(panda):
+    """What was identified of an arm is as uncertain as what is published; its zeros change no bit."""
+    config = presets.safe().with_(friction_compensation=False, friction_uncertainty=0.3)
+    qd = np.linspace(-0.4, 0.3, panda.n)
+
+    def uncertainty(drag):
+        controller = controller_at(replace(panda, drag=np.tile(drag, (panda.n, 1))), config)
+        controller.step(Measurement(panda.home, qd, UNTOUCHED), hold(panda))
+        return controller.record["state"]["detection"]["model_uncertainty"].copy()
+
+    friction = joint_friction(panda.friction, qd)
+    more = 0.3 * (np.abs(friction + 2.0 * qd + 0.5 * np.tanh(20.0 * qd)) - np.abs(friction))
+    assert_allclose(uncertainty((2.0, 0.0, 0.5)) - uncertainty((0.0, 0.0, 0.0)), more, atol=1e-9)
+    assert_allclose(uncertainty((2.0, 3.0, 0.5)), uncertainty((2.0, 0.0, 0.5)), atol=1e-9)
 
 
 def test_a_command_on_the_rise_raises_the_threshold(panda):

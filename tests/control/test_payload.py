@@ -2,11 +2,12 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
-from tests.control.plant import UNTOUCHED, Plant, controller_at, hold
+from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach
 
 from contactsafe import Controller, Measurement, Pose, presets
 from contactsafe.core.errors import InvalidInputError
@@ -53,6 +54,21 @@ def settle(plant, controller, target, ticks, sensor="none"):
 
 def largest_step(outs):
     return np.abs(np.diff([out.torque for out in outs], axis=0)).max()
+
+
+def test_dry_friction_that_was_identified_may_hold_as_much_as_the_published(panda):
+    """What holds an arm that is to rise by 10 mm and does not: 2 N m of friction, whatever column it stands in."""
+
+    def identified(phi1, dry):
+        arm = replace(panda, friction=np.tile((phi1, 12.0, 0.0), (7, 1)), drag=np.tile((0.0, 0.0, dry), (7, 1)))
+        controller = controller_at(arm, SAFE)
+        for _ in range(800):
+            controller.step(Measurement(arm.home, np.zeros(7)), reach(arm, (0.0, 0.0, 0.01)))
+        return controller.record["state"]["payload"].copy()
+
+    nothing, published, dry = identified(0.0, 0.0), identified(2.0, 0.0), identified(0.0, 2.0)
+    assert dry.tobytes() == published.tobytes()
+    assert dry["covariance"][0, 0] > 5.0 * nothing["covariance"][0, 0]
 
 
 @pytest.mark.parametrize("sensor", ["none", "contact only", "wrist"])

@@ -18,6 +18,8 @@ def trial(controller, seed, mm, scenario=WITH_WRENCH, **more):
         "joint_speed_peak_rad_s": 0.2,
         "report_ms": math.nan,
         "reject_ms": math.nan,
+        "never_rejected": 1.0,
+        "reported_early": 0.0,
         "link": 5.0,
         "ramp_ms": 100.0,
         "angle_deg": 0.0,
@@ -49,6 +51,12 @@ def test_verdict_sums_up_displacements_and_ratios():
     assert found["2 s after release, largest"] == pytest.approx(6.0)
 
 
+def test_contacts_reported_before_the_push_are_counted_beside_those_never_named():
+    found = figures(tables([2.0, 4.0], [10.0, 10.0], reported_early=1.0, never_rejected=0.0)["verdict"])
+    assert found["reported before the onset"] == 2
+    assert found["never named a push"] == 0
+
+
 def test_the_baseline_against_itself_is_never_worse():
     found = figures(tables([2.0, 4.0], [10.0, 90.0])["verdict"], "vices, with wrench")
     assert found["worse than vices"] == 0
@@ -73,7 +81,7 @@ def test_holding_and_moving_have_ratios_of_their_own():
 
 def test_what_was_never_reported_has_no_time_and_is_counted():
     trials = [trial("vices", 0, 5.0), trial("vices", 1, 5.0)]
-    trials += [trial("safe", 0, 5.0, reject_ms=80.0, report_ms=20.0), trial("safe", 1, 5.0)]
+    trials += [trial("safe", 0, 5.0, reject_ms=80.0, report_ms=20.0, never_rejected=0.0), trial("safe", 1, 5.0)]
     verdict, _ = push_tables(compared(trials, "vices"), "vices", "again {seed}")
     found = figures(verdict)
     assert (found["onset to report, median"], found["onset to 'push', median"]) == (20.0, 80.0)

@@ -103,6 +103,17 @@ def test_figures_are_of_the_push_and_of_what_comes_after():
     assert declared <= set(found)
 
 
+def test_a_contact_reported_before_the_push_has_no_time_since_it():
+    """It was 0 ms, the best there can be."""
+    scene = sample_pushed_motion(ARM, 3)
+    pushed, calm = traces(scene, (12.0, 30.0, 4.0))
+    pushed["mode"][: round(1000 * scene.meets_s) + 1] = 2
+    found = push_metrics(pushed, calm, scene)
+    assert math.isnan(found["report_ms"])
+    assert math.isnan(found["reject_ms"])
+    assert (found["reported_early"], found["never_rejected"]) == (1.0, 0.0)
+
+
 def test_a_tool_that_is_late_is_displaced_but_on_its_path():
     scene = next(scene for scene in (sample_pushed_motion(ARM, seed) for seed in range(30)) if not scene.holds)
     calm = np.zeros(round(1000 * scene.duration_s), dtype=trace_dtype(ARM.n))

@@ -11,9 +11,14 @@ from tests.robot.worlds import SIX
 
 from contactsafe import Payload, robots
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.logs import carried
 from contactsafe.logs.excitation import excitation
-from contactsafe.logs.identification import identify
+from contactsafe.logs.fitting import _solve
+from contactsafe.logs.identification import Identification, identify
+from contactsafe.logs.identified import results_of
+from contactsafe.logs.least_squares import Problem
 from contactsafe.logs.log import Log
+from contactsafe.logs.unknowns import Unknowns
 from contactsafe.robot.friction import joint_friction
 from contactsafe.robot.payload import carrying
 
@@ -155,11 +160,85 @@ def test_what_a_log_does_not_show_is_named_with_how_the_joint_moved(arm, motion)
     assert not any("joint 1," in one for one in said)
 
 
+def test_a_payload_that_the_file_cannot_hold_is_part_of_nothing(arm, log, monkeypatch):
+    """One that seems too far from the tool point: friction and check are those without it, and it is said why."""
+    monkeypatch.setattr(carried, "_FAR_M", 0.001)
+    found = identify(log, arm)
+    assert found.calibration.payload is None
+    assert all(not fit.unknowns.load and not fit.load().any() for fit in found.fits.values())
+    assert found.carried.left_out == "a payload of 0.8 kg was left out: it would be 0.059 m from the tool point"
+    note = results_of(found).tables[0].note
+    assert note.endswith("A payload of 0.8 kg was left out: it would be 0.059 m from the tool point.")
+    assert "payload" not in [table.name for table in results_of(found).tables]
+
+
+def test_a_payload_without_its_tensor_is_what_all_else_is_identified_with(arm, log, monkeypatch):
+    whole = identify(log, arm)
+    monkeypatch.setattr(carried, "can_carry", lambda arm, load: not load.inertia.any())
+    found = identify(log, arm)
+    assert_load(found.calibration.payload)
+    assert not found.calibration.payload.inertia.any()
+    for fit in found.fits.values():
+        assert_allclose(fit.load(), found.carried.parameters(arm))
+    assert_allclose(found.before, whole.before)
+    assert "counts as a point" in results_of(found).tables[0].note
+    (row,) = next(table for table in results_of(found).tables if table.name == "payload").as_records()
+    assert row["± mass"] > 0.0
+
+
+def test_what_a_file_holds_is_what_was_identified_with(arm, log):
+    found = identify(free(log, command=None), arm)
+    assert_allclose(found.carried.parameters(arm), found.fit.load(), atol=1e-9)
+    assert found.carried.left_out == ""
+
+
+def test_a_sensors_errors_may_have_either_sign(arm, log):
+    """Hysteresis that looks like dry friction which drives a joint."""
+    shown = log.torque - 0.2 * np.tanh(20.0 * log.qd)
+    known = identify(free(log, torque=shown, command=None), arm).calibration
+    assert_allclose(known.sensor.dry, -0.2, rtol=0.15)
+    assert (known.sensor.viscous >= 0.0).all()
+    told = robots.calibrated(arm, known)
+    assert (told.sensor_drag[:, 2] < 0.0).all()
+
+
+def test_what_is_kept_at_zero_is_not_zero_for_sure(arm, motion):
+    """It was reported as 0 ± 0: friction that drives a joint, which none does."""
+    log = logged(arm, motion, friction=lambda qd: -0.3 * np.tanh(20.0 * qd))
+    found = identify(free(log, torque=None), arm).fit
+    at_zero = found.of("viscous") < 1e-6
+    assert at_zero.any()
+    assert (found.deviation("viscous") > 1e-5).all()
+    assert (found.found("coulomb")[1] > 1e-5).all()
+
+
+def test_what_is_kept_at_zero_and_not_shown_is_no_surer_than_before():
+    """Viscous friction of a joint that hardly moves, and a log that happens to say it were negative."""
+    rng, unknowns = np.random.default_rng(0), Unknowns(1, False, False, False)
+    columns = rng.normal(size=(200, 1, 4)) * [1.0, 1e-3, 1.0, 1.0]
+    torque = columns @ [0.0, -3.0, 1.0, 1.0] + 0.01 * rng.normal(size=(200, 1))
+    problem = Problem(columns, torque, np.zeros(4), np.ones(4), np.ones((200, 1), dtype=bool))
+    solution = _solve(unknowns, problem)
+    assert abs(solution.value[1]) < 1e-6
+    assert np.sqrt(solution.covariance[1, 1]) > 0.5
+    assert np.sqrt(solution.covariance[2, 2]) < 0.01
+
+
+def test_windows_in_which_a_joint_sticks_are_no_part_of_the_check(arm, motion):
+    """What holds a joint at rest is whatever is asked of it: 3 N m at both ends of the motion, left by any fit."""
+    held = np.where(np.abs(motion.qd) < 1e-3, 3.0, 0.0)
+    log = logged(arm, motion, friction=lambda qd: 1.5 * np.sign(qd))
+    found = identify(free(log, torque=None, command=log.command + held), arm)
+    assert (found.after < 0.2).all()
+    counts = found.fit.problem.counts[len(found.fit.check) // 2 :]
+    assert not counts.all()
+
+
 @pytest.mark.parametrize(
     ("rows", "text"),
     [
         (slice(0, 1500), "is 1.5 s long; record 2 s or more"),
-        (slice(0, None, 40), "rows a second; record 50 or more"),
+        (slice(0, None, 40), "rows a second by its time; record 50 to 20000$"),
     ],
 )
 def test_too_little_is_refused(arm, log, rows, text):
@@ -198,6 +277,29 @@ def test_missing_rows_are_left_out(arm, log):
     thin = Log("gaps", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
     known = identify(thin, arm).calibration
     assert_allclose(known.sensor.bias, BIAS, rtol=0.05, atol=0.01)
+
+
+def test_a_log_that_loses_rows_in_every_window_is_refused(arm, log):
+    """20 ms in every 140 are missing: smoothed into their neighbours, no window of 100 ms is without them."""
+    kept = np.mod(log.time, 0.14) > 0.02
+    thin = Log("lossy", *(values[kept] for values in (log.time, log.q, log.qd, log.torque)))
+    with pytest.raises(InvalidInputError, match="lossy: rows are missing in all but 0 windows"):
+        identify(thin, arm)
+
+
+def test_a_check_that_came_to_nothing_is_none_that_was_passed(arm, log, monkeypatch):
+    """It was '0% smaller: nan', and a file was saved."""
+    monkeypatch.setattr(Identification, "after", property(lambda found: np.full(7, np.nan)))
+    with pytest.raises(InvalidInputError, match="the second no number; record a longer motion"):
+        identify(free(log, command=None), arm)
+
+
+def test_two_runs_days_apart_are_identified_as_one(arm, log):
+    """A year of rows at 1 kHz would not fit into any memory."""
+    later = log.time + (log.time > 6.0) * 3.2e7
+    known = identify(free(log, time=later, command=None), arm).calibration
+    assert_allclose(known.sensor.bias, BIAS, rtol=0.05, atol=0.01)
+    assert_load(known.payload)
 
 
 def test_a_joint_that_sticks_is_no_contact(arm, motion):

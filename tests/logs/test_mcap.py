@@ -127,6 +127,44 @@ def test_of_several_topics_one_is_chosen(tmp_path):
         read_log(path, topic="/other", joints=JOINTS)
 
 
+def test_a_topic_that_is_not_there_is_answered_with_those_that_are(tmp_path):
+    path = joint_states(tmp_path / "log.mcap", topics=("/left", "/right"))
+    with pytest.raises(InvalidInputError, match="no joint states on topic '/other'; joint states are on /left, /right"):
+        read_log(path, topic="/other", joints=JOINTS)
+    path = messages(tmp_path / "note.mcap", [["no object"]] * ROWS)
+    for topic in (None, "/other"):
+        with pytest.raises(
+            InvalidInputError, match="has no messages that can be read: its topics are /robot; give one"
+        ):
+            read_log(path, topic=topic)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [{"stamp": {"sec": None}}, {"stamp": {"sec": "a"}}, {"stamp": {"sec": 10**400}}, {"name": 3}, {"x": [10**400]}],
+)
+def test_json_that_is_not_as_expected_is_no_traceback(tmp_path, extra):
+    rows = [
+        {"q": q, "dq": qd, "tau_J": tau, **extra}
+        for q, qd, tau in zip(*map(np.ndarray.tolist, (Q, QD, TORQUE)), strict=True)
+    ]
+    assert_same(read_log(messages(tmp_path / "log.mcap", rows)))
+
+
+def test_a_joint_state_that_was_cut_is_told_in_one_line(tmp_path):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = plain.Writer(file)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
+        channel = writer.register_channel("/joint_states", "cdr", schema)
+        writer.add_message(channel, 1, b"\x00\x01\x00\x00\x05\x00", 1)
+        writer.finish()
+    with pytest.raises(InvalidInputError, match=r"log.mcap is no sound MCAP: .*; record it anew") as caught:
+        read_log(path, joints=JOINTS)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_topic_is_for_an_mcap(tmp_path):
     np.savez(tmp_path / "log.npz", time=TIME, q=Q, torque=TORQUE)
     with pytest.raises(InvalidInputError, match="topic = '/a' is for an MCAP"):
@@ -161,6 +199,9 @@ def test_without_the_extra_the_remedy_is_told(tmp_path, monkeypatch):
 def test_names_that_fit_decide_the_order():
     assert joint_order("log", ["elbow", "pan", "lift"], ["pan", "lift", "elbow"]) == [1, 2, 0]
     assert joint_order("log", ["arm_joint2", "arm_joint1"], ["joint1", "joint2"]) == [1, 0]
+    hand = [*(f"panda_joint{i}" for i in range(1, 8)), "panda_finger_joint1", "panda_finger_joint2"]
+    assert joint_order("log", hand, JOINTS) == list(range(7))
+    assert joint_order("log", hand[::-1], JOINTS) == list(range(8, 1, -1))
     assert joint_order("log", ["A1", "A2", "A3"], ["x", "y", "z"]) == [0, 1, 2]
 
 
@@ -170,6 +211,7 @@ def test_names_that_fit_decide_the_order():
         (["b", "a"], ["x", "y"]),
         (["A2", "A1"], ["x", "y"]),
         (["left_joint1", "right_joint1"], ["joint1"]),
+        (["left_joint1", "right_joint1", "left_joint2", "right_joint2"], ["joint1", "joint2"]),
         (["pan", "elbow"], ["pan", "lift"]),
     ],
 )

@@ -46,6 +46,16 @@ def test_an_npz_is_read(tmp_path):
     same(read_log(tmp_path / "log.npz"))
 
 
+def test_a_single_joint_may_be_without_columns(tmp_path):
+    """A one-joint NPZ with q of shape (T,)."""
+    np.savez(tmp_path / "log.npz", time=TIME, q=ARRAYS["q"][:, 0], torque=ARRAYS["torque"][:, 0])
+    log = read_log(tmp_path / "log.npz")
+    assert log.n == 1
+    np.testing.assert_array_equal(log.torque, ARRAYS["torque"][:, :1])
+    with pytest.raises(InvalidInputError, match=r"here: 'q' has shape \(60,\); give \(T, n\)"):
+        Log("here", TIME, ARRAYS["q"][:, 0], torque=ARRAYS["torque"][:, 0])
+
+
 def test_names_are_mapped_and_a_rate_stands_for_the_time(tmp_path):
     np.savez(tmp_path / "log.npz", a_q=ARRAYS["q"], a_dq=ARRAYS["qd"], a_tau=ARRAYS["torque"])
     same(read_log(tmp_path / "log.npz", {"q": "a_q", "qd": "a_dq", "torque": "a_tau"}, rate_hz=1000.0))

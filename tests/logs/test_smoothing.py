@@ -60,6 +60,19 @@ def test_what_is_missing_is_marked_with_its_neighbours():
     assert_allclose(signals.qd[signals.whole], velocity(signals)[signals.whole], atol=0.02)
 
 
+def test_two_runs_days_apart_take_no_more_rows_than_they_have():
+    log = waving(1000.0)
+    late = log.time + (log.time >= 2.0) * 1e6
+    signals = signals_of(Log("two runs", late, log.q, log.qd, log.torque))
+    assert len(signals.time) < len(log.time) + 20
+    assert signals.step_s == pytest.approx(0.001)
+    assert signals.time[-1] == pytest.approx(late[-1] - 0.02, abs=0.002)
+    assert (~signals.whole).sum() < 60
+    now = signals._replace(time=signals.time % 1e6)
+    assert_allclose(now.qd[now.whole], velocity(now)[now.whole], atol=0.02)
+    assert (signals.velocity_noise < 1e-3).all()
+
+
 def test_single_rows_that_are_missing_are_bridged():
     log = waving(1000.0)
     kept = RNG.random(len(log.time)) > 0.1

@@ -28,7 +28,12 @@ def test_a_log_of_a_motion_is_taken(arm):
     ("log", "text"),
     [
         (swinging(0.3, joints=6), "a log has 6 joints, arm 'panda' has 7; give the right robot"),
-        (swinging(0.3, rate_hz=30.0), "a log has 30 rows a second; record 50 or more"),
+        (swinging(0.3, rate_hz=30.0), "a log has 30 rows a second by its time; record 50 to 20000"),
+        (
+            swinging(0.3, rate_hz=25000.0),
+            "has 2.5e+04 rows a second by its time; record 50 to 20000; if they were stamped in bursts as they "
+            "arrived, give their rate, --rate HZ",
+        ),
         (swinging(0.3, seconds=1.0), "record 2 s or more, better 30, see `contactsafe record`"),
         (swinging(0.01), "is of an arm at rest: no joint moves by more than 0.018 rad"),
     ],

@@ -129,6 +129,21 @@ def test_another_robot_is_refused():
         robots.calibrated(robots.fr3("hand"), known())
 
 
+def test_an_arm_is_not_calibrated_twice(arm):
+    """The payload would count twice."""
+    once = robots.calibrated(arm, known())
+    assert once.calibrated
+    assert not arm.calibrated
+    with pytest.raises(InvalidInputError, match="arm 'panda' is calibrated already, and a payload would count twice"):
+        robots.calibrated(once, known())
+
+
+@pytest.mark.parametrize("name", ["torque_noise", "velocity_noise", "stiction"])
+def test_negative_noise_is_refused(name):
+    with pytest.raises(InvalidInputError, match=f"calibration: {name} has a negative number; identify anew"):
+        known(**{name: np.full(7, -0.1)})
+
+
 def test_a_payload_that_leaves_no_body_is_refused(arm):
     nothing = Payload(-9.0, np.zeros(3), np.zeros((3, 3)))
     assert not can_carry(arm, nothing)

@@ -8,7 +8,14 @@ from tests.robot.worlds import BALL_SHOULDER, ELBOW, SIX
 from contactsafe import Payload, robots
 from contactsafe.robot.description import Inertia
 from contactsafe.robot.payload import carrying
-from contactsafe.robot.regressor import link_regressor, motion_of, nominal_terms, parameters_of, site_in_link
+from contactsafe.robot.regressor import (
+    inertia_of,
+    link_regressor,
+    motion_of,
+    nominal_terms,
+    parameters_of,
+    site_in_link,
+)
 
 SCENES = {"six": (SIX, "tip"), "elbow": (ELBOW, "tip"), "ball": (BALL_SHOULDER, "tip")}
 
@@ -35,6 +42,15 @@ def test_they_are_those_of_the_dynamics(tmp_path, name):
         now = arm.dynamics(q[k], qd[k])
         assert_allclose(p[k], now["M"] @ qd[k], atol=1e-9)
         assert_allclose(beta[k], now["g"] - now["CT_qd"], atol=1e-9)
+
+
+@pytest.mark.parametrize("mass", [1.3, -0.4])
+def test_parameters_are_those_of_one_body(mass):
+    body = Inertia(mass, (0.02, -0.03, 0.05), (2e-3, 3e-3, 4e-3, 1e-4, 2e-4, -3e-4))
+    found = inertia_of(parameters_of(body))
+    assert found.mass == mass
+    assert_allclose(found.com, body.com)
+    assert_allclose(found.tensor, body.tensor, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["panda", "six"])

@@ -185,7 +185,15 @@ def test_negative_masses_are_refused(panda, field):
         ("drag", (1, 1), np.nan, "drag[1, 1] = nan N m; give a constant torque within ±87"),
         ("sensor_drag", (5, 1), 13.0, "sensor_drag[5, 1] = 13 N m; give a constant torque within ±12"),
         ("drag", (0, 2), 88.0, "drag[0, 2] = 88 N m; give dry friction from 0 to 87"),
-        ("sensor_friction", (2, 0), -0.1, "sensor_friction[2, 0] = -0.1 N m; give φ1 from 0 to 174, twice tau_max[2]"),
+        (
+            "sensor_friction",
+            (2, 0),
+            -175.0,
+            "sensor_friction[2, 0] = -175 N m; give φ1 from -174 to 174, twice tau_max[2]",
+        ),
+        ("sensor_drag", (2, 2), -88.0, "sensor_drag[2, 2] = -88 N m; give dry friction from -87 to 87"),
+        ("sensor_drag", (2, 0), np.inf, "sensor_drag[2, 0] = inf N m s/rad; give a finite number"),
+        ("drag", (0, 2), -0.1, "drag[0, 2] = -0.1 N m; give dry friction from 0 to 87"),
     ],
 )
 def test_drag_that_is_none_or_drives_its_joint_is_refused(panda, field, index, value, text):

@@ -38,6 +38,23 @@ def test_it_is_the_arm_it_was_written_from(panda, file):
 
 
 @pytest.mark.parametrize(
+    "beside",
+    [
+        '<transmission name="t"><joint name="joint1"><hardwareInterface>E</hardwareInterface></joint></transmission>',
+        '<ros2_control name="c" type="system"><joint name="joint1"><command_interface name="effort"/></joint>'
+        "</ros2_control>",
+    ],
+)
+def test_a_transmission_takes_no_speed_limit_away(panda, file, beside):
+    """Its <joint> has no <limit>, and is none of the robot's joints."""
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("</robot>", f"{beside}</robot>"), encoding="utf-8")
+    read = robots.from_urdf(file, "tcp", home=panda.home)
+    assert_allclose(read.qd_max, panda.qd_max)
+    assert_allclose(read.tau_max, panda.tau_max)
+
+
+@pytest.mark.parametrize(
     ("content", "text"),
     [
         ("<robot", "is no URDF that can be read"),

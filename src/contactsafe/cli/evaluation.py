@@ -116,6 +116,7 @@ def _show(asked: Any, conditions: dict[str, Any], results: dict[str, Any], meani
         "task": asked.task,
         "policy": asked.scripted or str(asked.bundle or "shipped"),
         "seed": asked.seed,
+        **({} if asked.calibration is None else {"calibration": str(asked.calibration)}),
         **conditions,
     }
     if asked.json:

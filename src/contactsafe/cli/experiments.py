@@ -23,6 +23,7 @@ from contactsafe.policy.manifest import MANIFEST, digest
 from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.robot import robots
 from contactsafe.robot.calibrated import arm_for
+from contactsafe.robot.calibration import Calibration
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 from contactsafe.tasks.base.registry import place_of
 
@@ -57,7 +58,8 @@ def demo(
     from contactsafe.report import prepare_output, terminal_table, write_report
 
     loaded = load_bundle(bundle, task)
-    config = ExperimentConfig(controllers, trials, seed, task=scenes_of(task, loaded, calibration), bundle=loaded)
+    scenes = scenes_of(task, loaded, load_calibration(calibration))
+    config = ExperimentConfig(controllers, trials, seed, task=scenes, bundle=loaded)
     folder = prepare_output(out)
     started = time.monotonic()
     results = _run(registry.PAPER, config)
@@ -137,9 +139,19 @@ def _config(asked: Options, entry: Entry) -> ExperimentConfig:
         raise InvalidInputError(f"experiment {entry.name} takes no {' and no '.join(unread)}; leave that out")
     trials = entry.trials if asked.trials is None else asked.trials
     bundle = load_bundle(asked.bundle, asked.task) if "bundle" in entry.takes else None
-    scenes = scenes_of(asked.task, bundle, asked.calibration) if "task" in entry.takes else None
-    arm = arm_for(load_calibration(asked.calibration), robots.panda)
-    return ExperimentConfig(asked.controllers, trials, asked.seed, asked.plants, asked.minutes, scenes, bundle, arm)
+    known = load_calibration(asked.calibration)
+    scenes = scenes_of(asked.task, bundle, known) if "task" in entry.takes else None
+    return ExperimentConfig(
+        asked.controllers,
+        trials,
+        asked.seed,
+        asked.plants,
+        asked.minutes,
+        scenes,
+        bundle,
+        arm_for(known, robots.panda),
+        None if asked.calibration is None else ("--calibration", str(asked.calibration)),
+    )
 
 
 experiment.__doc__ = docstring(experiment).replace(
@@ -147,7 +159,7 @@ experiment.__doc__ = docstring(experiment).replace(
 )
 
 
-def scenes_of(task: str, bundle: Bundle | None = None, calibration: Path | None = None) -> ExperimentTask:
+def scenes_of(task: str, bundle: Bundle | None = None, known: Calibration | None = None) -> ExperimentTask:
     """Return what the experiments ask of a task, under the conditions of the policy that does it.
 
     Raises:
@@ -156,7 +168,7 @@ def scenes_of(task: str, bundle: Bundle | None = None, calibration: Path | None 
     described = task_by_name(task)
     if described.scenes is None:
         raise InvalidInputError(f"task '{task}' has no scenes for experiments; see docs/howto/own_task.md")
-    config, known = described.config(None, None if bundle is None else bundle.conditions), load_calibration(calibration)
+    config = described.config(None, None if bundle is None else bundle.conditions)
     return described.scenes(config) if known is None else described.scenes(config, known)
 
 

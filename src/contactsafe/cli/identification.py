@@ -102,8 +102,18 @@ def record(arguments: Sequence[str]) -> None:
     print(
         "Follow it with your robot's joint controller while nothing touches the arm, and log time, q, qd, and torque\n"
         "(measured behind the gears: Franka's tau_J) or command (gravity included), or both; a row a measurement.\n"
-        "Then: contactsafe identify LOG"
+        f"Then: {_then(asked)}"
     )
+
+
+def _then(asked: RecordOptions) -> str:
+    """Return the command that takes the log of this robot."""
+    words = ["contactsafe", "identify", "LOG"]
+    for name in ("robot", "tool", "site"):
+        value = getattr(asked, name)
+        if value != getattr(RecordOptions, name):
+            words += [f"--{name}", str(value)]
+    return shlex.join(words)
 
 
 def _refuse_folder(path: Path) -> None:

@@ -32,7 +32,7 @@ class LogOptions:
         tool: what a Franka's flange carries: hand, wiper, or flange for nothing.
         site: end-effector point of an MJCF file, or link of a URDF file.
         columns: names that the log has for something, such as torque=tau_meas.
-        rate: of the log's rows, Hz, where it has no time.
+        rate: of the log's rows, Hz, where it has no time, or not the one at which they were measured.
         topic: of an MCAP's joint states, where several topics have some.
         joints: names that an MCAP has for the arm's joints, from base to tip, where they are not the arm's own.
         out: folder for the page.

@@ -6,7 +6,7 @@ from contactsafe.control.noise import noise_left
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.stack import stack_vector
-from contactsafe.robot.friction import joint_friction_into
+from contactsafe.robot.friction import joint_drag_into
 
 _f = np.float64
 _i = np.int64
@@ -56,11 +56,11 @@ def set_thresholds(
         params: `params_dtype` record.
     """
     known, allowed_nm = params.detection, params.observer.residual_noise_nm
-    friction = joint_friction_into(params.arm.friction, arm.qd, stack_vector(CT_qd.shape[0]))
+    friction = joint_drag_into(params.arm.friction, params.arm.drag, arm.qd, stack_vector(CT_qd.shape[0]))
     before_sensor = 0.0 if arm.has_torque != 0 else known.friction_uncertainty
     for i in range(CT_qd.shape[0]):
         inertial = abs(observer.momentum_rate[i]) + abs(CT_qd[i])
-        uncertainty = before_sensor * abs(friction[i]) + known.inertia_uncertainty * inertial
+        uncertainty = before_sensor * abs(friction[i] - params.arm.drag[i, 1]) + known.inertia_uncertainty * inertial
         uncertainty += known.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
         detection.model_uncertainty[i] = uncertainty
         detection.threshold[i] = known.residual_threshold + uncertainty + GRAVITY_SIGMAS * gravity_sigma[i]

@@ -9,6 +9,7 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.again import run_again
 from contactsafe.experiments.collision_metrics import METRICS, collision_metrics, describe, scene_metrics
 from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.collision_scenes import Meeting, sample_meetings
@@ -47,7 +48,7 @@ def collisions(config: ExperimentConfig, progress: Progress | None = None) -> Ex
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    return run_battery(controllers, config.seeds, config.plants, progress, config.arm)
+    return run_battery(controllers, config.seeds, config.plants, progress, config.arm, config.arm_words)
 
 
 ENTRY = Entry(
@@ -66,6 +67,7 @@ def run_battery(
     plants: Sequence[str] = PLANTS,
     progress: Progress | None = None,
     arm: Arm | None = None,
+    arm_words: Sequence[str] | None = None,
 ) -> Experiment:
     """Put controllers through the same collisions. A seed's trial does not depend on the others.
 
@@ -75,6 +77,7 @@ def run_battery(
         plants: some of `PLANTS`.
         progress: told how many trials were just done.
         arm: that collides; None for a Panda.
+        arm_words: what names it on the command line; None where nothing does.
 
     Returns:
         A trial for each seed, plant and controller, recordings of the first seed, tables of the comparison and of the
@@ -103,7 +106,8 @@ def run_battery(
     finally:
         pool.shutdown(cancel_futures=True)
     trials = tuple(trial for of_batch, _ in done for trial in of_batch)
-    tables = (verdict_table(trials), *worst_tables(trials, _replay(controllers, plants, _same_arm(arm, usual))))
+    again = run_again("run_battery", _words(controllers, plants), controllers, (arm, usual), arm_words)
+    tables = (verdict_table(trials), *worst_tables(trials, again))
     return Experiment(
         NAME, "Collisions", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,), tables=tables
     )
@@ -131,19 +135,10 @@ def _run_batch(
     return trials, recordings
 
 
-def _same_arm(one: Arm, other: Arm) -> bool:
-    return (one.description, one.tool) == (other.description, other.tool)
-
-
-def _replay(controllers: Mapping[str, ControllerConfig], plants: Sequence[str], usual_arm: bool) -> str:
-    """Return how one seed is run again, with {seed} in its place."""
-    if not usual_arm:
-        return "run_battery(controllers, [{seed}], arm=arm)"
-    if all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
-        names = "" if tuple(controllers) == ExperimentConfig.controllers else f" --controllers {','.join(controllers)}"
-        names += "" if tuple(plants) == PLANTS else f" --plants {','.join(plants)}"
-        return f"contactsafe experiment collisions{names} --trials 1 --out trial-{{seed}} --seed {{seed}}"
-    return "run_battery(controllers, [{seed}])"
+def _words(controllers: Mapping[str, ControllerConfig], plants: Sequence[str]) -> list[str]:
+    """Return the words that ask for a battery, those that are not the default."""
+    words = [] if tuple(controllers) == ExperimentConfig.controllers else ["--controllers", ",".join(controllers)]
+    return [NAME, *words, *([] if tuple(plants) == PLANTS else ["--plants", ",".join(plants)])]
 
 
 class _Batch:

@@ -39,6 +39,7 @@ class ExperimentConfig:
         task: for experiments that run one.
         bundle: policy, for experiments that run one.
         arm: that moves by a script, in experiments that run no task.
+        arm_words: what names that arm on the command line; None where nothing does.
     """
 
     controllers: tuple[str, ...] = ("vices", "paper", "safe")
@@ -49,6 +50,7 @@ class ExperimentConfig:
     task: ExperimentTask | None = None
     bundle: Bundle | None = None
     arm: Arm = field(default_factory=robots.panda)
+    arm_words: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         """Refuse unknown controllers and empty experiments."""

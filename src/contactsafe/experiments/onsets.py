@@ -10,7 +10,7 @@ from contactsafe.control.codes import FREE
 from contactsafe.control.config import ControllerConfig
 from contactsafe.experiments.collision_motions import sample_motion, scene_rng
 from contactsafe.experiments.motions import Playback
-from contactsafe.experiments.surfaces import is_uncovered, sample_surface_point
+from contactsafe.experiments.surfaces import is_uncovered, sample_place
 from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.experiment import Trial
 from contactsafe.robot.arm import Arm, description_and_tool
@@ -66,19 +66,17 @@ def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str
     """
     origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
     while True:
-        link = int(rng.choice(pushed_links(arm)))
-        point, normal = sample_surface_point(arm, link, rng)
+        at = sample_place(arm, origins[0], rotations[0], pushed_links(arm), rng)
         size = math.exp(rng.uniform(*np.log(FORCE_N)))
-        place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal
-        if not is_uncovered(arm, q, place, inwards):
+        if not is_uncovered(arm, q, at.world, at.inwards):
             continue
-        torque = point_torque(origins[0], rotations[0], link, place, inwards)
+        torque = point_torque(origins[0], rotations[0], at.link, at.world, at.inwards)
         if scenario == STEP:
             lever = float(np.abs(torque).max())
             if lever < _LEVER_M:
                 continue
             size = STEP_NM / lever
-        return Push(link, point, size * inwards, size * torque)
+        return Push(at.link, at.point, size * at.inwards, size * torque)
 
 
 def point_torque(

@@ -30,7 +30,7 @@ FLOOR_MM = 1.0
 
 
 def push_metrics(trace: np.ndarray, calm: np.ndarray, scene: PushedMotion) -> dict[str, float]:
-    """Summarise one push by the simulator's truth.
+    """Summarise one push by the simulator's truth; times are NaN where a contact was reported before its onset.
 
     Args:
         trace: `trace_dtype` records, one a ms, (T,).
@@ -42,15 +42,17 @@ def push_metrics(trace: np.ndarray, calm: np.ndarray, scene: PushedMotion) -> di
     onset, release = round(1000 * scene.meets_s), round(1000 * scene.release_s)
     speed = 1000.0 * np.abs(np.diff(trace["q"][onset:], axis=0))
     mode = trace["mode"][onset:release]
+    early = bool(mode[0] != FREE)
     return {
         "tool_displacement_mm": float(away[onset:release].max()),
         "tool_off_path_mm": float(off_path[onset:release].max()),
         "tool_displacement_after_mm": float(away[release:].max()),
         "tool_error_end_mm": float(away[-1]),
         "joint_speed_peak_rad_s": float(speed.max()),
-        "report_ms": _first(mode != FREE),
-        "reject_ms": _first(mode == REJECT),
-        "reported_early": float(mode[0] != FREE),
+        "report_ms": math.nan if early else _first(mode != FREE),
+        "reject_ms": math.nan if early else _first(mode == REJECT),
+        "reported_early": float(early),
+        "never_rejected": float(not (mode == REJECT).any()),
         "tau_peak_nm": float(np.abs(trace["tau_arm"][onset:release]).max()),
         "force_n": float(np.linalg.norm(scene.force)),
         "link": float(scene.link),

@@ -7,7 +7,7 @@ import numpy as np
 
 from contactsafe.experiments.collision_motions import Motion, sample_motion, scene_rng
 from contactsafe.experiments.onsets import pushed_links
-from contactsafe.experiments.surfaces import is_uncovered, sample_surface_point
+from contactsafe.experiments.surfaces import is_uncovered, sample_place
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.ik import solve_ik
 from contactsafe.robot.shape import link_frames
@@ -112,11 +112,9 @@ def sample_touchable_point(
     """
     origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
     while True:
-        link = int(rng.choice(links or pushed_links(arm)))
-        point, normal = sample_surface_point(arm, link, rng)
-        place, inwards = origins[0, link] + rotations[0, link] @ point, -rotations[0, link] @ normal
-        if is_uncovered(arm, q, place, inwards):
-            return link, point, inwards
+        at = sample_place(arm, origins[0], rotations[0], links or pushed_links(arm), rng)
+        if is_uncovered(arm, q, at.world, at.inwards):
+            return at.link, at.point, at.inwards
 
 
 def posture_at(arm: Arm, motion: Motion, time_s: float) -> np.ndarray:

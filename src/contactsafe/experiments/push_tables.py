@@ -65,7 +65,8 @@ _ROWS: tuple[tuple[str, str, _Figure], ...] = (
     ("joint speed, peak, 95th percentile", "rad/s", _percentile("joint_speed_peak_rad_s", 95)),
     ("onset to report, median", "ms", _percentile("report_ms", 50)),
     ("onset to 'push', median", "ms", _percentile("reject_ms", 50)),
-    ("never named a push", "", lambda trials: int(sum(math.isnan(t.metrics["reject_ms"]) for t in trials))),
+    ("never named a push", "", _count("never_rejected")),
+    ("reported before the onset", "", _count("reported_early")),
 )
 
 

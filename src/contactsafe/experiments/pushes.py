@@ -10,6 +10,7 @@ import numpy as np
 from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.again import run_again
 from contactsafe.experiments.config import BATCH, Entry, ExperimentConfig, Progress
 from contactsafe.experiments.motions import Playback, record_rest
 from contactsafe.experiments.push_metrics import METRICS, against, push_metrics
@@ -52,7 +53,7 @@ def pushes(config: ExperimentConfig, progress: Progress | None = None) -> Experi
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    return run_pushes(controllers, config.seeds, progress, config.arm)
+    return run_pushes(controllers, config.seeds, progress, config.arm, config.arm_words)
 
 
 ENTRY = Entry(
@@ -69,6 +70,7 @@ def run_pushes(
     seeds: Sequence[int],
     progress: Progress | None = None,
     arm: Arm | None = None,
+    arm_words: Sequence[str] | None = None,
 ) -> Experiment:
     """Give controllers the same pushes. A seed's trial does not depend on the others.
 
@@ -77,6 +79,7 @@ def run_pushes(
         seeds: one a scene: of motion, plant, push and noise.
         progress: told how many trials were just done.
         arm: that is pushed; None for a Panda.
+        arm_words: what names it on the command line; None where nothing does.
 
     Returns:
         Two trials for each seed and controller, with and without the wrist's wrench; recordings of the first seed;
@@ -97,20 +100,12 @@ def run_pushes(
         pool.shutdown(cancel_futures=True)
     baseline = BASELINE if BASELINE in controllers else next(iter(controllers))
     trials = compared([trial for of_batch, _ in done for trial in of_batch], baseline)
+    words = [NAME, "--controllers", ",".join(controllers)]
+    again = run_again("run_pushes", words, controllers, (arm, usual), arm_words)
     return Experiment(
         NAME, "Pushes", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,),
-        tables=push_tables(trials, baseline, _replay(controllers, arm, usual)),
+        tables=push_tables(trials, baseline, again),
     )  # fmt: skip
-
-
-def _replay(controllers: Mapping[str, ControllerConfig], arm: Arm, usual: Arm) -> str:
-    """Return how one seed is run again, with {seed} in its place."""
-    if (arm.description, arm.tool) != (usual.description, usual.tool):
-        return "run_pushes(controllers, [{seed}], arm=arm)"
-    if not all(name in presets.PRESETS and presets.by_name(name) == config for name, config in controllers.items()):
-        return "run_pushes(controllers, [{seed}])"
-    words = f"--controllers {','.join(controllers)} --trials 1"
-    return f"contactsafe experiment pushes {words} --out trial-{{seed}} --seed {{seed}}"
 
 
 def _run_batch(

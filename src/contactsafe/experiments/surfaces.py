@@ -1,5 +1,8 @@
 """Points on the surface of an arm, and how far others are from it."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from contactsafe.robot.arm import Arm, description_and_tool
@@ -25,6 +28,38 @@ def sample_surface_point(arm: Arm, link: int, rng: np.random.Generator) -> tuple
         normal -= (normal @ axis) * axis
         normal /= np.linalg.norm(normal)
     return foot + capsule.radius * normal, normal
+
+
+class Place(NamedTuple):
+    """A point of the arm's surface in one posture.
+
+    Attributes:
+        link: 1 … n.
+        point: in the link's frame, (3,), m.
+        world: the same in world axes, (3,), m.
+        inwards: normal into the link, world, (3,).
+    """
+
+    link: int
+    point: np.ndarray
+    world: np.ndarray
+    inwards: np.ndarray
+
+
+def sample_place(
+    arm: Arm, origins: np.ndarray, rotations: np.ndarray, links: Sequence[int], rng: np.random.Generator
+) -> Place:
+    """Sample a link, and a point of its surface, which something may cover.
+
+    Args:
+        arm: built from a description.
+        origins, rotations: frames of `link_frames` in one posture, (n + 2, 3) m and (n + 2, 3, 3).
+        links: to choose from.
+        rng: of the sample.
+    """
+    link = int(rng.choice(links))
+    point, normal = sample_surface_point(arm, link, rng)
+    return Place(link, point, origins[link] + rotations[link] @ point, -rotations[link] @ normal)
 
 
 def clearance(arm: Arm, q: np.ndarray, point: np.ndarray) -> float:

@@ -5,28 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.logs.carried import Carried, carried_by
 from contactsafe.logs.fitting import Fit, fit
 from contactsafe.logs.log import Log
 from contactsafe.logs.smoothing import Signals, signals_of
-from contactsafe.logs.soundness import refuse_contact, refuse_unfit
+from contactsafe.logs.soundness import refuse_contact, refuse_gaps, refuse_unfit
 from contactsafe.logs.stiction import breakaway_torque
 from contactsafe.robot.arm import Arm, require_arm
-from contactsafe.robot.calibrated import can_carry, tool_name
+from contactsafe.robot.calibrated import tool_name
 from contactsafe.robot.calibration import Calibration
-from contactsafe.robot.payload import Payload
-from contactsafe.robot.regressor import site_in_link
-
-_SURE = 3.0
-"""Standard deviations by which a payload's mass must be other than zero."""
 
 _SHOWN = 0.5
 """Fraction of what was not known beforehand that may be left of an unknown which the log shows."""
 
 _WORSE = 1.02
+"""By this factor the residual of the second half may grow: what is fitted to noise adds about 1 % to a description that
+cannot be made better."""
+
 _NOTHING = 5e-4
 """A residual of this fraction of the torque limit is none."""
-
-_FAR_M = 1.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +36,7 @@ class Identification:
         calibration: what was found, from the whole log.
         fits: 'sensor' from torque measured behind the gears, 'losses' from commands; one or both.
         signals: of the log.
+        carried: what the tool carries beside its description, with which everything else was identified.
     """
 
     log: Log
@@ -46,6 +44,7 @@ class Identification:
     calibration: Calibration
     fits: dict[str, Fit]
     signals: Signals
+    carried: Carried
 
     @property
     def fit(self) -> Fit:
@@ -54,24 +53,38 @@ class Identification:
 
     @property
     def before(self) -> np.ndarray:
-        """Residual of the second half by the arm's description, rms, (n,), N m."""
-        return _rms(_second(self.fit.nominal))
+        """Residual of the second half by the arm's description, rms, (n,), N m; NaN where a joint only ever stuck."""
+        return _rms(_second(self.fit.nominal), _second(self.fit.problem.counts))
 
     @property
     def after(self) -> np.ndarray:
-        """Residual of the second half by what the first half shows, rms, (n,), N m."""
-        return _rms(_second(self.fit.check))
+        """Residual of the second half by what the first half shows, rms, (n,), N m; NaN likewise."""
+        return _rms(_second(self.fit.check), _second(self.fit.problem.counts))
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Both over all joints that moved, N m."""
+        if not self._moved.any():
+            return np.nan, np.nan
+        before, after = (float(np.sqrt(np.mean(part[self._moved] ** 2))) for part in (self.before, self.after))
+        return before, after
+
+    @property
+    def _moved(self) -> np.ndarray:
+        """Which joints count anywhere in the second half, (n,)."""
+        return np.any(_second(self.fit.problem.counts), axis=0)
 
     @property
     def reduction(self) -> float:
         """By which fraction the residual of the second half, rms over all joints, is smaller."""
-        before = float(np.sqrt(np.sum(self.before**2)))
-        return 1.0 - float(np.sqrt(np.sum(self.after**2))) / before if before > 0.0 else 0.0
+        before, after = self.rms
+        return 1.0 - after / before if before != 0.0 else 0.0
 
     @property
     def fits_already(self) -> bool:
         """Whether the description leaves next to nothing."""
-        return bool((self.before < _NOTHING * self.arm.tau_max).all())
+        nothing = self.before < _NOTHING * self.arm.tau_max
+        return bool(self._moved.any() and nothing[self._moved].all())
 
     def not_shown(self, part: str) -> tuple[str, ...]:
         """Return what a fit does not show, a few words a joint, with how the joint moved.
@@ -93,7 +106,7 @@ class Identification:
 
     def verdict(self) -> str:
         """Return what came of it, in one line."""
-        before, after = (float(np.sqrt(np.mean(part**2))) for part in (self.before, self.after))
+        before, after = self.rms
         if self.fits_already:
             return f"the description fits this log already: its residual is {before:.3g} N m rms"
         return (
@@ -118,26 +131,37 @@ def identify(log: Log, arm: Arm) -> Identification:
     """
     require_arm(arm)
     refuse_unfit(log, arm)
-    signals, fits = signals_of(log), {}
-    carried = None
+    signals, fits = signals_of(log), dict[str, Fit]()
+    refuse_gaps(log, signals)
+    carried = Carried(None)
     if signals.torque is not None:
-        fits["sensor"] = fit(arm, signals, signals.torque, behind_gears=True)
-        carried = fits["sensor"].load()
-    if signals.command is not None:
-        fits["losses"] = fit(arm, signals, signals.command, behind_gears=False, carried=carried)
+        fits["sensor"], carried = _fit_with_payload(arm, signals, signals.torque, behind_gears=True)
+    if signals.command is not None and not fits:
+        fits["losses"], carried = _fit_with_payload(arm, signals, signals.command, behind_gears=False)
+    elif signals.command is not None:
+        fits["losses"] = fit(arm, signals, signals.command, behind_gears=False, carried=carried.parameters(arm))
     refuse_contact(log, arm, next(iter(fits.values())))
-    found = Identification(log, arm, _calibration(log, arm, signals, fits), fits, signals)
-    if not found.fits_already and found.reduction < 1.0 - _WORSE:
+    found = Identification(log, arm, _calibration(log, arm, signals, fits, carried), fits, signals, carried)
+    if not found.fits_already and not found.reduction >= 1.0 - _WORSE:  # NaN as well
+        worse = f"{-found.reduction:.0%} larger" if np.isfinite(found.reduction) else "no number"
         raise InvalidInputError(
-            f"{log.source}: what its first half shows makes the residual of the second {-found.reduction:.0%} larger; "
+            f"{log.source}: what its first half shows makes the residual of the second {worse}; "
             "record a longer motion in which every joint moves to and fro, see `contactsafe record`"
         )
     return found
 
 
-def _calibration(log: Log, arm: Arm, signals: Signals, fits: dict[str, Fit]) -> Calibration:
+def _fit_with_payload(arm: Arm, signals: Signals, torque: np.ndarray, behind_gears: bool) -> tuple[Fit, Carried]:
+    """Return the fit of one torque with the payload that the file will hold, whatever else a fit might assume."""
+    found = fit(arm, signals, torque, behind_gears)
+    carried = carried_by(found, arm)
+    if carried.left_out:
+        found = fit(arm, signals, torque, behind_gears, carried.parameters(arm))
+    return found, carried
+
+
+def _calibration(log: Log, arm: Arm, signals: Signals, fits: dict[str, Fit], carried: Carried) -> Calibration:
     losses, sensor = fits.get("losses"), fits.get("sensor")
-    payload = payload_of(next(iter(fits.values())), arm)
     stiction = np.full(arm.n, np.nan) if losses is None else breakaway_torque(arm, signals, losses)
     return Calibration(
         robot=arm.name,
@@ -148,36 +172,17 @@ def _calibration(log: Log, arm: Arm, signals: Signals, fits: dict[str, Fit]) -> 
         losses=None if losses is None else losses.losses(),
         rotor=None if losses is None else np.maximum(losses.of("rotor"), 0.0),
         sensor=None if sensor is None else sensor.losses(),
-        payload=payload,
+        payload=carried.payload,
         source=log.source,
     )
 
 
-def payload_of(found: Fit, arm: Arm) -> Payload | None:
-    """Return the payload that a fit shows, in the tool's frame; None where there is none to speak of."""
-    if not found.unknowns.load:
-        return None
-    mass, moment, tensor = np.split(found.of("load"), [1, 4])
-    kg = float(mass[0])
-    if abs(kg) < _SURE * float(found.deviation("load")[0]):
-        return None
-    R, origin = site_in_link(arm)
-    at = moment / kg
-    com = R.T @ (at - origin)
-    xx, yy, zz, xy, xz, yz = tensor
-    about_frame = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    inertia = R.T @ (about_frame - kg * (at @ at * np.eye(3) - np.outer(at, at))) @ R
-    if np.linalg.norm(com) > _FAR_M:
-        return None
-    for one in (Payload(kg, com, inertia), Payload(kg, com, np.zeros((3, 3)))):
-        if can_carry(arm, one) and (kg < 0.0 or np.linalg.eigvalsh(one.inertia)[0] >= 0.0):
-            return one
-    return None
+def _second(values: np.ndarray) -> np.ndarray:
+    return values[len(values) // 2 :]
 
 
-def _second(residual: np.ndarray) -> np.ndarray:
-    return residual[len(residual) // 2 :]
-
-
-def _rms(residual: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.mean(residual**2, axis=0))
+def _rms(residual: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return the size of each joint's residual in the windows that count, (n,); NaN where none does."""
+    many = counts.sum(axis=0)
+    squares = np.sum(np.where(counts, residual**2, 0.0), axis=0)
+    return np.sqrt(np.where(many > 0, squares, np.nan) / np.maximum(many, 1))

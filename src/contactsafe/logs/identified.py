@@ -57,12 +57,13 @@ def _curve(i: int) -> Curve:
 def _check(found: Identification) -> Table:
     before, after = found.before, found.after
     rows = tuple(
-        (i + 1, float(before[i]), float(after[i]), 100.0 * (1.0 - float(after[i] / max(before[i], 1e-12))))
+        (i + 1, float(before[i]), float(after[i]), 100.0 * (1.0 - float(after[i] / np.maximum(before[i], 1e-12))))
         for i in range(found.arm.n)
     )
-    total = (float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2))), 100.0 * found.reduction)
+    total = (*found.rms, 100.0 * found.reduction)
     columns = ("joint", "by the description, rms (N m)", "identified, rms (N m)", "smaller by (%)")
     note = "Residual torque of the second half of the log; identified from the first half alone."
+    note += f" {found.carried.left_out[0].upper()}{found.carried.left_out[1:]}." if found.carried.left_out else ""
     return Table("check", "The second half", columns, (*rows, ("all", *total)), note)
 
 
@@ -86,10 +87,10 @@ def _joints(found: Identification, part: str) -> Table:
 
 
 def _load(found: Identification) -> tuple[Table, ...]:
-    load, fit = found.calibration.payload, found.fit
+    load = found.carried.payload
     if load is None:
         return ()
-    spread = _CONFIDENCE * float(fit.deviation("load")[0])
+    spread = _CONFIDENCE * found.carried.deviation
     row = (load.mass, spread, *(float(value) for value in load.com), *(float(load.inertia[k, k]) for k in range(3)))
     columns = ("mass (kg)", "± mass", "com x (m)", "com y (m)", "com z (m)", "Ixx (kg m²)", "Iyy", "Izz")
     note = "Carried beside what the description has, in the tool's frame; inertia about the centre of mass."

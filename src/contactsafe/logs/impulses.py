@@ -67,15 +67,13 @@ def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np
         torque: which is taken to drive the links, (T, n), N m.
         shapes: of friction to compare, φ2 s/rad and φ3 rad/s of every joint, (n, 2) each; see `friction_step`.
     """
-    step = float(signals.time[1] - signals.time[0])
-    rows = max(2, round(WINDOW_S / step))
+    step, rows = _window(signals)
     found: list[Impulses] = []
     for part in _parts(len(signals.time), rows):
         q, qd, rate = signals.q[part], signals.qd[part], 1.0 / (rows * step)
         motion = motion_of(arm, q, qd)
         p, beta = nominal_terms(arm, motion, qd, rotors=False)
         p_load, beta_load = link_regressor(arm, motion, arm.n)
-        whole = _windows(1.0 - signals.whole[part], rows, step) < 0.5 * step
         found.append(
             Impulses(
                 signals.time[part][:-1:rows] + 0.5 * rows * step,
@@ -85,7 +83,7 @@ def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np
                 _moving(qd, rows),
                 tuple(rate * _windows(friction_step(shape, qd), rows, step) for shape in shapes),
                 rate * (_windows(beta_load, rows, step) + np.diff(p_load[::rows], axis=0)),
-            ).part(whole)
+            ).part(_whole(signals.whole[part], rows))
         )
     return Impulses(
         np.concatenate([one.time for one in found]),
@@ -98,6 +96,12 @@ def impulses_of(arm: Arm, signals: Signals, torque: np.ndarray, shapes: tuple[np
     )
 
 
+def whole_windows(signals: Signals) -> np.ndarray:
+    """Tell in which windows of a log no row is missing, (N,)."""
+    rows = _window(signals)[1]
+    return _whole(signals.whole[: (len(signals.whole) - 1) // rows * rows + 1], rows)
+
+
 def friction_step(shape: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Return Gaz's step in velocity for φ1 = 2, from about −1 to 1 and zero at rest, (T, n).
 
@@ -107,6 +111,15 @@ def friction_step(shape: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """
     steep, shift = shape.T
     return np.tanh(0.5 * steep * (qd + shift)) - np.tanh(0.5 * steep * shift)
+
+
+def _window(signals: Signals) -> tuple[float, int]:
+    """Return the time between two rows, s, and how many such times a window has."""
+    return signals.step_s, max(2, round(WINDOW_S / signals.step_s))
+
+
+def _whole(whole: np.ndarray, rows: int) -> np.ndarray:
+    return _windows(1.0 - whole, rows, 1.0) < 0.5
 
 
 def _parts(count: int, rows: int) -> Iterator[slice]:

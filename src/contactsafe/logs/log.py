@@ -43,7 +43,9 @@ class Log:
         """Refuse what no robot recorded."""
         if len(self.time) < LEAST_ROWS:
             raise InvalidInputError(f"{self.source} has {len(self.time)} rows; give at least {LEAST_ROWS}")
-        n = self.q.shape[1] if self.q.ndim == 2 else 0
+        if self.q.ndim != 2:
+            raise InvalidInputError(f"{self.source}: 'q' has shape {self.q.shape}; give (T, n)")
+        n = int(self.q.shape[1])
         for field in fields(self)[1:]:
             self._check(field.name, {"time": 0, "wrench_ee": 6}.get(field.name, n))
         if self.torque is None and self.command is None:

@@ -3,8 +3,10 @@
 import importlib.util
 import itertools
 import json
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import struct
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,34 +36,44 @@ def read_mcap(path: Path, topic: str | None, joints: Sequence[str] | None) -> di
 
     try:
         by_topic = _messages(path, topic)
+        if topic is not None and not by_topic.get(topic):
+            by_topic = _messages(path, None)  # to name those that there are
     except OSError:
         raise
-    except (McapError, ValueError, LookupError, EOFError, MemoryError) as error:
+    except (McapError, ValueError, LookupError, EOFError, MemoryError, struct.error) as error:
         said = shown(" ".join(str(error).split()) or type(error).__name__)
         raise InvalidInputError(f"{path.name} is no sound MCAP: {said}; record it anew") from None
-    found = {name: rows for name, rows in by_topic.items() if any("q" in row or "position" in row for row in rows)}
-    found = found or by_topic
-    if topic is not None and topic not in by_topic:
-        raise InvalidInputError(f"{path.name} has no joint states on topic {shown(topic)}; {_listed(found)}")
-    if len(found) != 1 and topic is None:
-        raise InvalidInputError(f"{path.name}: {_listed(found)}; say which, --topic NAME")
-    rows = found.get(topic, by_topic.get(topic, [])) if topic is not None else next(iter(found.values()))
-    return _arrays(path.name, rows, joints)
+    return _arrays(path.name, _chosen(path.name, by_topic, topic), joints)
 
 
-def _listed(topics: Iterable[str]) -> str:
-    names = sorted(topics)
-    return f"joint states are on {', '.join(names)}" if names else "no topic has messages that can be read"
+def _chosen(source: str, by_topic: Mapping[str, list[dict[str, Any]]], topic: str | None) -> list[dict[str, Any]]:
+    """Return the messages of the topic that was asked for, or of the only one that has joint states."""
+    readable = {name: rows for name, rows in by_topic.items() if rows}
+    found = {name: rows for name, rows in readable.items() if any("q" in row or "position" in row for row in rows)}
+    found = found or readable
+    if topic in readable:
+        return readable[topic]
+    if not found:
+        topics = f"its topics are {', '.join(sorted(by_topic))}" if by_topic else "it has no topic"
+        raise InvalidInputError(f"{source} has no messages that can be read: {topics}; give one with joint states")
+    listed = f"joint states are on {', '.join(sorted(found))}"
+    if topic is not None:
+        raise InvalidInputError(f"{source} has no joint states on topic {shown(topic)}; {listed}")
+    if len(found) > 1:
+        raise InvalidInputError(f"{source}: {listed}; say which, --topic NAME")
+    return next(iter(found.values()))
 
 
 def _messages(path: Path, topic: str | None) -> dict[str, list[dict[str, Any]]]:
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
+    """Return the messages of one topic or of all that can be read, by topic; those of others are empty."""
     factory, decoders = DecoderFactory(), dict[int, Any]()
     found: dict[str, list[dict[str, Any]]] = {}
     with path.open("rb") as file:
         for schema, channel, message in make_reader(file).iter_messages(topics=None if topic is None else [topic]):
+            rows = found.setdefault(channel.topic, [])
             if channel.message_encoding == "json":
                 row = _from_json(message.data)
             elif channel.message_encoding == "cdr" and schema is not None and schema.name.endswith("/JointState"):
@@ -73,7 +85,7 @@ def _messages(path: Path, topic: str | None) -> dict[str, list[dict[str, Any]]]:
                 continue
             if row:
                 row.setdefault("time", 1e-9 * message.log_time)
-                found.setdefault(channel.topic, []).append(row)
+                rows.append(row)
     return found
 
 
@@ -88,10 +100,20 @@ def _from_json(data: bytes) -> dict[str, Any]:
     header = message.get("header")
     stamp = (header if isinstance(header, Mapping) else message).get("stamp")
     row = {str(name): value for name, value in message.items() if isinstance(value, list | int | float) and value != []}
+    if not isinstance(row.get("name", []), list):
+        del row["name"]
     if isinstance(stamp, Mapping):
-        seconds = float(stamp.get("sec", 0)) + 1e-9 * float(stamp.get("nanosec", stamp.get("nsec", 0)))
+        seconds = _number(stamp.get("sec", 0)) + 1e-9 * _number(stamp.get("nanosec", stamp.get("nsec", 0)))
         row |= {"time": seconds} if seconds > 0.0 else {}
     return row
+
+
+def _number(value: Any) -> float:
+    """Return a number of JSON, NaN for what is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
 
 
 def _from_joint_state(message: Any) -> dict[str, Any]:
@@ -110,7 +132,7 @@ def _arrays(source: str, rows: list[dict[str, Any]], joints: Sequence[str] | Non
     for name in sorted(common):
         try:
             values = np.array([row[name] for row in ordered], dtype=float)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             continue
         found[name] = values
     return found
@@ -144,8 +166,9 @@ def _in_order(source: str, rows: list[dict[str, Any]], joints: Sequence[str] | N
 def joint_order(source: str, names: Sequence[str], joints: Sequence[str]) -> list[int]:
     """Return where each of an arm's joints stands among the names of a message.
 
-    A message's name fits if it ends in the arm's, as panda_joint1 in joint1. Where none fit, as many names as joints
-    are taken in their order if the numbers in them ascend, for they say the same.
+    A message's name fits if it ends in the arm's, as panda_joint1 in joint1; where several fit one joint, as
+    panda_finger_joint1 does, those that all begin alike are taken. Where none fit, as many names as joints are taken in
+    their order if the numbers in them ascend, for they say the same.
 
     Raises:
         InvalidInputError: some fit and others do not, several fit one joint, or there is no telling.
@@ -153,6 +176,11 @@ def joint_order(source: str, names: Sequence[str], joints: Sequence[str]) -> lis
     fitting = [[k for k, name in enumerate(names) if name == joint] for joint in joints]
     if not all(len(found) == 1 for found in fitting):
         fitting = [[k for k, name in enumerate(names) if name.endswith(joint)] for joint in joints]
+        begin = [{name.removesuffix(joint) for name in names if name.endswith(joint)} for joint in joints]
+        alike = set.intersection(*begin) if begin else set()
+        if len(alike) == 1:
+            (prefix,) = alike
+            fitting = [[k for k, name in enumerate(names) if name == prefix + joint] for joint in joints]
     if all(len(found) == 1 for found in fitting):
         return [found[0] for found in fitting]
     numbers = [re.findall(r"\d+", name) for name in names]

@@ -38,7 +38,7 @@ def read_log(
     Args:
         path: of a file that ends in .csv, .npz or .mcap.
         columns: names that differ from `NAMES`: what is held → name in the file.
-        rate_hz: of its rows, where it has no time.
+        rate_hz: of its rows, in place of its time, if any.
         topic: of an MCAP's messages; None for the only one that has joint states.
         joints: names of the arm's joints from base to tip, by which an MCAP's are put in order; None for their own.
 
@@ -72,7 +72,8 @@ def read_log(
     time = given.pop("time", None)
     if rate_hz is not None:
         time = np.arange(len(given["q"])) / rate_hz
-    return Log(path.name, np.asarray(time).reshape(-1), **given)
+    columns_of = {known: values[:, None] if values.ndim == 1 else values for known, values in given.items()}
+    return Log(path.name, np.asarray(time).reshape(-1), **columns_of)
 
 
 def _pick(source: str, arrays: Mapping[str, np.ndarray], known: str, name: str | None) -> np.ndarray | None:

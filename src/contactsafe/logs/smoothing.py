@@ -15,7 +15,7 @@ _GAP, _GAP_S = 3.0, 0.01
 
 
 class Signals(NamedTuple):
-    """What a log says at T evenly spaced times.
+    """What a log says at T evenly spaced times, but for gaps, of which a few rows stand for each.
 
     Attributes:
         time: (T,), s.
@@ -35,35 +35,43 @@ class Signals(NamedTuple):
     velocity_noise: np.ndarray
     torque_noise: np.ndarray
 
+    @property
+    def step_s(self) -> float:
+        """Time between two rows that are no gap, s."""
+        return float(np.median(np.diff(self.time)))
+
 
 def signals_of(log: Log) -> Signals:
     """Return a log at even times; torques stay as they were recorded, for integrals over windows smooth them."""
     step = log.step_s
-    time = np.arange(log.time[0], log.time[-1] + 0.5 * step, step)
-    before = np.clip(np.searchsorted(log.time, time, side="right") - 1, 0, len(log.time) - 2)
-    whole = np.diff(log.time)[before] < max(_GAP * step, _GAP_S)
+    most = max(_GAP * step, _GAP_S)
+    # However long a gap is, it takes its least: two runs days apart would fill the memory.
+    told = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(log.time), most))])
+    even = np.arange(0.0, told[-1] + 0.5 * step, step)
+    before = np.clip(np.searchsorted(told, even, side="right") - 1, 0, len(told) - 2)
+    whole = np.diff(log.time)[before] < most
     half = max(2, round(_HALF_WIDTH_S / step))
-    whole = np.convolve(~whole, np.ones(2 * half + 1), "same") < 0.5  # what is missing is smoothed into its neighbours
+    whole = np.convolve(~whole, np.ones(2 * half + 3), "same") < 0.5  # what is missing is smoothed into its neighbours
     value, slope = _kernels(half, step)
-    q = _even(log.time, log.q, time)
-    inner = slice(half, len(time) - half)
-    qd, noise = _smoothed(q, slope), _noise(np.gradient(q, step, axis=0)[inner], value)
+    q = _even(told, log.q, even)
+    inner = slice(half, len(even) - half)
+    qd, noise = _smoothed(q, slope), _noise(np.gradient(q, step, axis=0)[inner], value, whole[inner])
     if log.qd is not None:
-        own = _even(log.time, log.qd, time)
-        own_noise = _noise(own[inner], value)
+        own = _even(told, log.qd, even)
+        own_noise = _noise(own[inner], value, whole[inner])
         quieter = own_noise <= noise
         qd, noise = np.where(quieter, _smoothed(own, value), qd), np.where(quieter, own_noise, noise)
     recorded = {name: getattr(log, name) for name in ("torque", "command")}
-    drives = {name: _even(log.time, values, time)[inner] for name, values in recorded.items() if values is not None}
+    drives = {name: _even(told, values, even)[inner] for name, values in recorded.items() if values is not None}
     return Signals(
-        time[inner],
+        np.interp(even, told, log.time)[inner],
         _smoothed(q, value),
         qd,
         drives.get("torque"),
         drives.get("command"),
         whole[inner],
         noise,
-        _noise(next(iter(drives.values())), value),
+        _noise(next(iter(drives.values())), value, whole[inner]),
     )
 
 
@@ -82,9 +90,14 @@ def _smoothed(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
     return np.stack([np.convolve(column, kernel[::-1], "valid") for column in values.T], axis=1)
 
 
-def _noise(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Return the standard deviation of what a smoothing takes off, made up for what it leaves, (n,)."""
+def _noise(values: np.ndarray, kernel: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Return the standard deviation of what a smoothing takes off, made up for what it leaves, (n,).
+
+    Rows about a gap count only where there are no others.
+    """
     half = len(kernel) // 2
     rest = values[half : len(values) - half] - _smoothed(values, kernel)
+    counts = whole[half : len(values) - half]
+    rest = rest[counts] if counts.any() else rest
     kept = 1.0 - 2.0 * kernel[half] + float(kernel @ kernel)
     return np.sqrt(np.mean(rest**2, axis=0) / max(kept, math.ulp(1.0)))

@@ -4,10 +4,15 @@ import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.logs.fitting import Fit
+from contactsafe.logs.impulses import WINDOW_S, whole_windows
 from contactsafe.logs.log import Log
+from contactsafe.logs.smoothing import Signals
 from contactsafe.robot.arm import Arm
 
 LEAST_S = 2.0
+LEAST_WINDOWS = 18
+"""One fewer than a log of `LEAST_S` without gaps has: half of them must show what the other half does."""
+
 _LEAST_RAD = 0.05
 """A log in which no joint moves so far shows nothing."""
 
@@ -28,9 +33,14 @@ def refuse_unfit(log: Log, arm: Arm) -> None:
     """
     if log.n != arm.n:
         raise InvalidInputError(f"{log.source} has {log.n} joints, arm '{arm.name}' has {arm.n}; give the right robot")
-    low, high = RATES_HZ
-    if not low <= 1.0 / log.step_s <= high:
-        raise InvalidInputError(f"{log.source} has {1.0 / log.step_s:.3g} rows a second; record {low:g} or more")
+    rate_hz, (low, high) = 1.0 / log.step_s, RATES_HZ
+    if not low <= rate_hz <= high:
+        bursts = (
+            "; if they were stamped in bursts as they arrived, give their rate, --rate HZ" if rate_hz > high else ""
+        )
+        raise InvalidInputError(
+            f"{log.source} has {rate_hz:.3g} rows a second by its time; record {low:g} to {high:.0f}{bursts}"
+        )
     if log.seconds < LEAST_S:
         raise InvalidInputError(
             f"{log.source} is {log.seconds:.2g} s long; record {LEAST_S:g} s or more, better 30, see "
@@ -41,6 +51,20 @@ def refuse_unfit(log: Log, arm: Arm) -> None:
         raise InvalidInputError(
             f"{log.source} is of an arm at rest: no joint moves by more than {moved.max():.2g} rad; record a motion of "
             "all joints, see `contactsafe record`"
+        )
+
+
+def refuse_gaps(log: Log, signals: Signals) -> None:
+    """Refuse a log of which hardly a window is without missing rows.
+
+    Raises:
+        InvalidInputError: as it says.
+    """
+    left = int(whole_windows(signals).sum())
+    if left < LEAST_WINDOWS:
+        raise InvalidInputError(
+            f"{log.source}: rows are missing in all but {left} windows of {WINDOW_S:g} s, and {LEAST_WINDOWS} are "
+            "needed; record without losing rows"
         )
 
 

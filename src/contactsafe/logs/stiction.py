@@ -15,6 +15,7 @@ _BEFORE_S = 0.06
 """Before it moves, in which the torque that it takes is largest."""
 
 _SMOOTH_S = 0.02
+"""Over which the torque is averaged: as long as its noise is smoothed elsewhere, a third of the time looked at."""
 
 
 def breakaway_torque(arm: Arm, signals: Signals, found: Fit) -> np.ndarray:
@@ -25,22 +26,29 @@ def breakaway_torque(arm: Arm, signals: Signals, found: Fit) -> np.ndarray:
         signals: of a log with commands.
         found: fit of the commands.
     """
-    step = float(signals.time[1] - signals.time[0])
+    step = signals.step_s
     torque = np.full(arm.n, np.nan)
     for i in range(arm.n):
-        starts = _starts(signals.qd[:, i], step)
+        starts = _starts(signals.qd[:, i], signals.whole, step)
         taken = [_taken(arm, signals, found, i, start, step) for start in starts]
         if taken:
             torque[i] = float(np.median(taken))
     return torque
 
 
-def _starts(qd: np.ndarray, step: float) -> list[int]:
-    """Return the rows in which a joint begins to move after it rested."""
+def _starts(qd: np.ndarray, whole: np.ndarray, step: float) -> list[int]:
+    """Return the rows in which a joint begins to move after it rested, with no rows missing about them."""
     rest, moves = np.abs(qd) < _REST_RAD_S, np.abs(qd) > _MOVES_RAD_S
     long, soon = max(2, round(_REST_S / step)), max(2, round(_START_S / step))
     ends = np.flatnonzero(rest[:-1] & ~rest[1:]) + 1
-    return [int(end) for end in ends if end >= long and rest[end - long : end].all() and moves[end : end + soon].any()]
+    return [
+        int(end)
+        for end in ends
+        if end >= long
+        and rest[end - long : end].all()
+        and moves[end : end + soon].any()
+        and whole[end - long : end + soon].all()
+    ]
 
 
 def _taken(arm: Arm, signals: Signals, found: Fit, joint: int, start: int, step: float) -> float:

@@ -75,6 +75,7 @@ class Arm(Independent):
         surface: points of the links' surface, (P, 7), rows as in `contactsafe.robot.surface`; empty where unknown.
         places: where something may touch the links or, last, the tool, (P, 7), see `contactsafe.robot.touchable`; by
             default the surface and what the tool says. Where another tool or surface replaces them, give none.
+        calibrated: whether it is as it was identified; see `contactsafe.robots.calibrated`.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
@@ -101,6 +102,7 @@ class Arm(Independent):
     drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    calibrated: bool = False
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""

@@ -28,9 +28,13 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
         calibration: of this robot, or the path of its file.
 
     Raises:
-        InvalidInputError: the file is no calibration, it is of another robot, or what was identified is no arm.
+        InvalidInputError: the file is no calibration, it is of another robot, what was identified is no arm, or the
+            arm is calibrated already.
     """
-    require_arm(arm)
+    if require_arm(arm).calibrated:
+        raise InvalidInputError(
+            f"arm '{arm.name}' is calibrated already, and a payload would count twice; give the arm of its description"
+        )
     known = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
     if known.n != arm.n or known.robot != arm.name:
         raise InvalidInputError(
@@ -56,6 +60,7 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
         sensor_drag=arm.sensor_drag if sensor is None else sensor.drag,
         description=description,
         tool=tool,
+        calibrated=True,
     )
 
 

@@ -78,7 +78,7 @@ class Calibration:
         source: the log.
 
     Raises:
-        InvalidInputError: numbers that are not one a joint, or not finite.
+        InvalidInputError: numbers that are not one a joint, or not finite; negative noise or stiction.
     """
 
     robot: str
@@ -99,6 +99,8 @@ class Calibration:
                 raise InvalidInputError(f"calibration: {name} has shape {values.shape}; give {self.n} numbers")
             if not (np.isfinite(values) | (name == "stiction") & np.isnan(values)).all():
                 raise InvalidInputError(f"calibration: {name} has a number that is not finite; identify anew")
+            if name in ("torque_noise", "velocity_noise", "stiction") and (values < 0.0).any():
+                raise InvalidInputError(f"calibration: {name} has a negative number; identify anew")
         load = () if self.payload is None else (self.payload.mass, *self.payload.com, *np.ravel(self.payload.inertia))
         if not np.isfinite(load).all() or len(load) not in (0, 13):
             raise InvalidInputError("calibration: payload is not a mass, a centre and a finite tensor; identify anew")

@@ -58,9 +58,13 @@ class Inertia:
         com = (self.mass * np.array(self.com) + other.mass * np.array(other.com)) / mass
         total = np.zeros((3, 3))
         for part in (self, other):
-            r = np.array(part.com) - com
-            total += part.matrix() + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+            total += part.matrix() + point_tensor(part.mass, np.array(part.com) - com)
         return Inertia.of(mass, com, total)
+
+
+def point_tensor(mass: float, at: np.ndarray) -> np.ndarray:
+    """Return the tensor of a point mass, kg, at a place (3,), m, about the origin: m (c·c I − c cᵀ), (3, 3), kg m²."""
+    return mass * (at @ at * np.eye(3) - np.outer(at, at))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.description import Inertia
+from contactsafe.robot.description import Inertia, point_tensor
 
 PARAMETERS = 10
 """Of a body: m kg, m c kg m, tensor about the frame's origin kg m²."""
@@ -114,11 +114,7 @@ def link_inertia(arm: Arm, link: int) -> Inertia:
     for body in range(first + 1, model.nbody):
         if model.body_weldid[body] != first or model.body_mass[body] == 0.0:
             continue
-        R, origin, above = np.eye(3), np.zeros(3), body
-        while above != first:
-            turn = quat_to_matrix(model.body_quat[above])
-            R, origin = turn @ R, model.body_pos[above] + turn @ origin
-            above = int(model.body_parentid[above])
+        R, origin = _in_body(model, body, first, np.eye(3), np.zeros(3))
         own = inertia_in_body(model, body)
         total = total + Inertia.of(own.mass, origin + R @ np.array(own.com), R @ own.matrix() @ R.T)
     return total
@@ -134,30 +130,42 @@ def inertia_in_body(model: mujoco.MjModel, body: int) -> Inertia:
 def parameters_of(inertia: Inertia) -> np.ndarray:
     """Return the ten parameters of a body, in which torque is linear, (10,)."""
     c = np.array(inertia.com)
-    tensor = inertia.matrix() + inertia.mass * (c @ c * np.eye(3) - np.outer(c, c))
-    moments = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    return np.array([inertia.mass, *(inertia.mass * c), *moments])
+    about_origin = Inertia.of(inertia.mass, c, inertia.matrix() + point_tensor(inertia.mass, c))
+    return np.array([inertia.mass, *(inertia.mass * c), *about_origin.tensor])
+
+
+def inertia_of(parameters: np.ndarray) -> Inertia:
+    """Return the body that has ten parameters, whose mass is not zero; see `parameters_of`."""
+    mass, moment, tensor = np.split(parameters, [1, 4])
+    kg = float(mass[0])
+    about_origin = Inertia(kg, (0.0, 0.0, 0.0), tuple(tensor.tolist()))
+    return Inertia.of(kg, moment / kg, about_origin.matrix() - point_tensor(kg, moment / kg))
 
 
 def site_in_link(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
     """Return the tool's frame in that of the last link: rotation (3, 3), and origin (3,), m."""
-    model = arm.model
-    site = model.site(arm.site).id
-    R, origin, body = quat_to_matrix(model.site_quat[site]), model.site_pos[site], int(model.site_bodyid[site])
-    while model.body_jntnum[body] == 0:
-        turn = quat_to_matrix(model.body_quat[body])
-        R, origin, body = turn @ R, model.body_pos[body] + turn @ origin, int(model.body_parentid[body])
-    return R, np.array(origin)
+    model, site = arm.model, arm.model.site(arm.site).id
+    body = int(model.site_bodyid[site])
+    link = int(model.body_weldid[body])
+    return _in_body(model, body, link, quat_to_matrix(model.site_quat[site]), model.site_pos[site])
 
 
 def _base(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Return the frame that the first link's body is placed in."""
-    origin, R, body = np.zeros(3), np.eye(3), int(model.body_parentid[model.jnt_bodyid[0]])
-    while body != 0:
+    body = int(model.body_parentid[model.jnt_bodyid[0]])
+    R, origin = _in_body(model, body, 0, np.eye(3), np.zeros(3))
+    return origin, R
+
+
+def _in_body(
+    model: mujoco.MjModel, body: int, above: int, R: np.ndarray, origin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a frame that is fixed to a body in the frame of one above it, while all joints between are at rest."""
+    while body != above:
         turn = quat_to_matrix(model.body_quat[body])
         R, origin = turn @ R, model.body_pos[body] + turn @ origin
         body = int(model.body_parentid[body])
-    return origin, R
+    return R, np.array(origin)
 
 
 def _gravity(arm: Arm) -> np.ndarray:

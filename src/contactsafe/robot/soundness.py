@@ -44,6 +44,11 @@ def as_numbers(arm: Any) -> dict[str, np.ndarray | float]:
     return {**fields, **single, **surfaces}
 
 
+def model_numbers(arm: Any) -> dict[str, np.ndarray]:
+    """Return the numbers of an arm's nominal model: masses, frames, axes, rotors, gravity."""
+    return {"gravity": arm.model.opt.gravity, **{name: getattr(arm.model, name) for name in _MODEL}}
+
+
 def _rows(value: Any, name: str) -> np.ndarray:
     points = len(value) if hasattr(value, "__len__") else 0
     return array_of(value, (points, SURFACE_COLUMNS), name)
@@ -82,14 +87,14 @@ def refuse_unsound(arm: Any) -> None:
 
     Raises:
         InvalidInputError: gravity, the model, a limit, friction, drag, home or surface is not finite, a mass or
-            friction is negative, or a joint's range is empty.
+            friction of a joint is negative, or a joint's range is empty.
     """
     _refuse_unsound_model(arm)
     _refuse_unsound_limits(arm)
-    _refuse_unsound_friction(arm, "friction")
-    _refuse_unsound_friction(arm, "sensor_friction")
-    _refuse_unsound_drag(arm, "drag")
-    _refuse_unsound_drag(arm, "sensor_drag")
+    _refuse_unsound_friction(arm, "friction", least=0.0)
+    _refuse_unsound_friction(arm, "sensor_friction", least=-1.0)  # an error of a sensor may have either sign
+    _refuse_unsound_drag(arm, "drag", least=0.0)
+    _refuse_unsound_drag(arm, "sensor_drag", least=-1.0)
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")
@@ -142,28 +147,32 @@ def _refuse_unsound_limits(arm) -> None:
         )
 
 
-def _refuse_unsound_friction(arm, name: str) -> None:
-    """Refuse friction that drives a joint, and that no motor overcomes: φ1 is the sum of both directions."""
+def _refuse_unsound_friction(arm, name: str, least: float) -> None:
+    """Refuse friction that no motor overcomes, φ1 is the sum of both directions; and less than `least` of the most."""
     for i, (phi1, phi2, phi3) in enumerate(getattr(arm, name)):
         most = 2.0 * arm.tau_max[i]
-        if not 0.0 <= phi1 <= most:
-            raise InvalidInputError(f"{name}[{i}, 0] = {phi1:g} N m; give φ1 from 0 to {most:g}, twice tau_max[{i}]")
+        if not least * most <= phi1 <= most:
+            allowed = f"{least * most:g} to {most:g}"
+            raise InvalidInputError(f"{name}[{i}, 0] = {phi1:g} N m; give φ1 from {allowed}, twice tau_max[{i}]")
         if not 0.0 <= phi2 < np.inf:
             raise InvalidInputError(f"{name}[{i}, 1] = {phi2:g} s/rad; give a finite φ2 from 0 on")
         if not np.isfinite(phi3):
             raise InvalidInputError(f"{name}[{i}, 2] = {phi3:g} rad/s; give a finite φ3")
 
 
-def _refuse_unsound_drag(arm, name: str) -> None:
-    """Refuse viscous and dry friction that drive a joint, and constants that no motor overcomes."""
+def _refuse_unsound_drag(arm, name: str, least: float) -> None:
+    """Refuse what no motor overcomes, and viscous and dry friction of a joint that drive it; `least` as above."""
     for i, (viscous, constant, dry) in enumerate(getattr(arm, name)):
         most = arm.tau_max[i]
-        if not 0.0 <= viscous < np.inf:
-            raise InvalidInputError(f"{name}[{i}, 0] = {viscous:g} N m s/rad; give viscous friction from 0 on")
+        if not np.isfinite(viscous) or (least == 0.0 and viscous < 0.0):
+            allowed = "viscous friction from 0 on" if least == 0.0 else "a finite number"
+            raise InvalidInputError(f"{name}[{i}, 0] = {viscous:g} N m s/rad; give {allowed}")
         if not abs(constant) <= most:
             raise InvalidInputError(f"{name}[{i}, 1] = {constant:g} N m; give a constant torque within ±{most:g}")
-        if not 0.0 <= dry <= most:
-            raise InvalidInputError(f"{name}[{i}, 2] = {dry:g} N m; give dry friction from 0 to {most:g}")
+        if not least * most <= dry <= most:
+            raise InvalidInputError(
+                f"{name}[{i}, 2] = {dry:g} N m; give dry friction from {least * most:g} to {most:g}"
+            )
 
 
 def _listed(numbers) -> str:

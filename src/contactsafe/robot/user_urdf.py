@@ -43,11 +43,11 @@ def from_urdf(
     Raises:
         InvalidInputError: the file cannot be read, has no such link, or what `from_mjcf` says.
     """
-    root = _robot(path)
-    names = [one.get("name", "") for one in root.iter("link")]
+    root = _robot(path)  # joints and links are its children: <transmission> and <ros2_control> have others
+    names = [one.get("name", "") for one in root.findall("link")]
     if link not in names:
         raise InvalidInputError(f"{os.fspath(path)} has no link {shown(link)}; give one of {', '.join(names)}")
-    site = link if link not in {joint.get("name") for joint in root.iter("joint")} else f"{link}_frame"
+    site = link if link not in {joint.get("name") for joint in root.findall("joint")} else f"{link}_frame"
     arm = from_mjcf(
         _model(path, root, link, site),
         site,
@@ -58,7 +58,7 @@ def from_urdf(
         home=home,
         tip=tip,
     )
-    speeds = {joint.get("name"): _limit(joint, "velocity") for joint in root.iter("joint")}
+    speeds = {joint.get("name"): _limit(joint, "velocity") for joint in root.findall("joint")}
     fastest = [speeds.get(arm.model.joint(i).name, np.inf) for i in range(arm.n)]
     return replace(arm, qd_max=np.array([speed if speed > 0.0 else np.inf for speed in fastest]))
 
@@ -71,7 +71,7 @@ def _robot(path: str | os.PathLike) -> ET.Element:
         raise InvalidInputError(f"{os.fspath(path)} is no URDF that can be read: {error}; give its path") from None
     if root.tag != "robot":
         raise InvalidInputError(f"{os.fspath(path)} has no <robot>; give a URDF")
-    for one in root.iter("link"):
+    for one in root.findall("link"):
         for part in one.findall("visual") + one.findall("collision"):
             if part.tag == "visual" or part.find("geometry/mesh") is not None:
                 one.remove(part)
@@ -87,7 +87,7 @@ def _model(path: str | os.PathLike, root: ET.Element, link: str, site: str) -> m
         spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
         body = spec.body(link) or spec.worldbody  # the root link is the world
         body.add_site(name=site)
-        for joint in root.iter("joint"):
+        for joint in root.findall("joint"):
             effort, name = _limit(joint, "effort"), joint.get("name", "")
             if joint.get("type") in ("revolute", "continuous") and effort > 0.0:
                 motor = spec.add_actuator(name=_MOTOR.format(name), target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)

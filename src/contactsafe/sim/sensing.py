@@ -83,11 +83,7 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     errors["has_wrist"] = sensors.wrist
     errors["tool_mass"], errors["tool_com"] = arm.tool.inertia.mass, arm.tool.inertia.com
     errors["tcp"] = arm.tool.tcp
-    errors["friction"] = arm.friction
-    errors["friction"][:, 0] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
-    errors["drag"] = arm.drag
-    for column in (0, 2):
-        errors["drag"][:, column] *= per_joint(config.plant.friction_scale, arm.n, "friction_scale")
+    fill_friction(errors, arm.friction, arm.drag, per_joint(config.plant.friction_scale, arm.n, "friction_scale"))
     errors["stiction"] = per_joint(config.plant.stiction_nm, arm.n, "stiction_nm")
     joints = errors["joints"]
     joints["band_sigma"] = sensors.velocity_band_rad_s * band_gain(tick_s)
@@ -95,6 +91,20 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     joints["play"], joints["rotor"] = sensors.joint_torque_play_nm, arm.model.dof_armature
     joints["friction"], joints["drag"] = arm.sensor_friction, arm.sensor_drag
     errors["delay_ticks"] = config.plant.torque_delay_ticks
+
+
+def fill_friction(errors: Record, friction: np.ndarray, drag: np.ndarray, scale: np.ndarray | float) -> None:
+    """Fill friction and drag of an `errors_dtype` record, scaled but for the constant torque, which is no friction.
+
+    Args:
+        errors: to fill.
+        friction, drag: as of `Arm`, (n, 3) each.
+        scale: of both, (n,) or one number.
+    """
+    errors["friction"], errors["drag"] = friction, drag
+    errors["friction"][:, 0] *= scale
+    errors["drag"][:, 0] *= scale
+    errors["drag"][:, 2] *= scale
 
 
 @compiled

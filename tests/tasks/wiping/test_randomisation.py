@@ -1,11 +1,14 @@
 """Episodes that differ: what is drawn is in force, is forgotten by the next, and never leaves its range."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import contactsafe  # noqa: F401  (registers the task)
+from contactsafe import robots
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.randomisation import Randomisation, sample
@@ -67,6 +70,17 @@ def test_friction_pad_and_payload_are_the_plants_and_gone_with_the_episode():
         assert_allclose(tasks.boards.records[0]["pad_half"], 0.5 * nominal.geom("tip").size[:2])
         assert model.body("tool").mass[0] == pytest.approx(nominal.body("tool").mass[0] + 0.3)
         assert not tasks.worlds.records[0]["errors"]["friction"][:, 0].any()
+
+
+def test_viscous_and_dry_friction_of_a_calibrated_arm_are_scaled_too():
+    arm = replace(robots.panda(), drag=np.tile((0.5, 0.3, 0.2), (7, 1)))
+    config = WipingConfig(randomisation=Randomisation(joint_friction=(2.0, 2.0)))
+    tasks = WipingTasks(config, 1, seed=0, arm=arm)
+    for _ in range(2):
+        tasks.reset(0, np.random.default_rng(0))
+        errors = tasks.worlds.records[0]["errors"]
+        assert_allclose(errors["friction"][:, 0], 2.0 * arm.friction[:, 0])
+        assert_allclose(errors["drag"], np.tile((1.0, 0.3, 0.4), (7, 1)))
 
 
 def test_a_late_picture_is_the_one_of_so_many_steps_ago():

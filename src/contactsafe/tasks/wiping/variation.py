@@ -13,6 +13,7 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.state import Entry, check_state_dict, load_state_dict, of_array, state_dict
 from contactsafe.robot.mjcf import TIP_GEOM
+from contactsafe.sim.sensing import fill_friction
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.wiping.board import Camera
 from contactsafe.tasks.wiping.camera import INK_PIXEL, OTHER_PIXEL, camera_tables, stack_cameras
@@ -133,7 +134,8 @@ class _Plant:
         # Not the records themselves: a copy of this would keep the old ones.
         self._worlds, self._boards, self._i = worlds, boards, i
         model, errors = worlds.models[i], worlds.records[i]["errors"]
-        self._friction, self._pad_half = errors["friction"].copy(), boards.records[i]["pad_half"].copy()
+        self._friction, self._drag = errors["friction"].copy(), errors["drag"].copy()
+        self._pad_half = boards.records[i]["pad_half"].copy()
         self._delay = int(errors["delay_ticks"])
         self._board, self._tool, self._pad = model.body("workbench").id, model.body("tool").id, model.geom(TIP_GEOM).id
         self._links = [k for k in range(model.nbody) if model.body(k).name.startswith("link")]
@@ -151,8 +153,7 @@ class _Plant:
         model.body_mass[self._links] *= sampled["inertia"]
         model.body_inertia[self._links] *= sampled["inertia"]
         model.body_mass[self._tool] += sampled["payload_kg"]
-        errors["friction"] = self._friction
-        errors["friction"][:, 0] *= sampled["joint_friction"]
+        fill_friction(errors, self._friction, self._drag, sampled["joint_friction"])
         self._boards.records[self._i]["pad_half"] = self._pad_half * sampled["pad_size"]
         errors["delay_ticks"] = max(self._delay, sampled["torque_delay_ticks"])
 
