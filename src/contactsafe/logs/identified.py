@@ -4,14 +4,15 @@ import numpy as np
 
 from contactsafe.logs.fitting import Fit
 from contactsafe.logs.identification import Identification
+from contactsafe.logs.results import joint_figure
 from contactsafe.results.experiment import Experiment, Table
-from contactsafe.results.figures import Curve, Figure, Panel
 from contactsafe.results.recording import Recording
 from contactsafe.sim.truth import trace_dtype
 
 BEFORE, AFTER = "description", "identified"
 
 _SECOND = "second half"
+_CAPTION = "Torque that the model leaves unexplained, each half by what the other one shows. Shaded: second half."
 _CONFIDENCE = 1.96
 """Standard deviations on both sides of a value that hold the true one with 95 %."""
 
@@ -26,7 +27,7 @@ def results_of(found: Identification) -> Experiment:
         f"Identification from {found.log.source}",
         found.verdict(),
         recordings=tuple(_recording(found, name) for name in (BEFORE, AFTER)),
-        figures=(_figure(found),),
+        figures=(joint_figure(found.arm.n, _CAPTION, _SECOND),),
         tables=(_check(found), *(_joints(found, name) for name in found.fits), *_load(found), _noise(found)),
     )
 
@@ -39,19 +40,6 @@ def _recording(found: Identification, name: str) -> Recording:
     curves = {str(i): values[:, i] for i in range(found.arm.n)}
     second = np.arange(len(values)) >= len(values) // 2
     return Recording(found.log.source, name, 0, trace, curves={**curves, _SECOND: second})
-
-
-def _figure(found: Identification) -> Figure:
-    return Figure(
-        plots=tuple((Panel(f"joint {i + 1}", "N m", _curve(i)),) for i in range(found.arm.n)),
-        caption="Torque that the model leaves unexplained, each half by what the other one shows. Shaded: second half.",
-        shaded=lambda run: run.curves[_SECOND],
-        of_a_log=True,
-    )
-
-
-def _curve(i: int) -> Curve:
-    return lambda run: run.curves[str(i)]
 
 
 def _check(found: Identification) -> Table:

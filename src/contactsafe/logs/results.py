@@ -11,6 +11,7 @@ from contactsafe.sim.truth import trace_dtype
 RESIDUAL, THRESHOLD = "residual", "threshold"
 
 _TOUCHED = "touched"
+_CAPTION = "External joint torque and the threshold with which its size is compared. Shaded: something touches."
 
 
 def results_of(replay: Replay) -> Experiment:
@@ -20,7 +21,7 @@ def results_of(replay: Replay) -> Experiment:
         f"Replay of {replay.log.source}",
         replay.verdict(),
         recordings=tuple(_recording(replay, name) for name in (RESIDUAL, THRESHOLD)),
-        figures=(_figure(replay),),
+        figures=(joint_figure(replay.log.n, _CAPTION, _TOUCHED),),
         tables=(_touches(replay), _signals(replay)),
     )
 
@@ -33,11 +34,12 @@ def _recording(replay: Replay, name: str) -> Recording:
     return Recording(replay.log.source, name, 0, trace, curves={**curves, _TOUCHED: replay.touched})
 
 
-def _figure(replay: Replay) -> Figure:
+def joint_figure(n: int, caption: str, shaded: str) -> Figure:
+    """Declare the plots of a log: a curve a joint, N m, kept under its number, and when something is so, shaded."""
     return Figure(
-        plots=tuple((Panel(f"joint {i + 1}", "N m", _curve(i)),) for i in range(replay.log.n)),
-        caption="External joint torque and the threshold with which its size is compared. Shaded: something touches.",
-        shaded=lambda run: run.curves[_TOUCHED],
+        plots=tuple((Panel(f"joint {i + 1}", "N m", _curve(i)),) for i in range(n)),
+        caption=caption,
+        shaded=lambda run: run.curves[shaded],
         of_a_log=True,
     )
 

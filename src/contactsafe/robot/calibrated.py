@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.robot.arm import Arm, require_arm
 from contactsafe.robot.calibration import Calibration
 from contactsafe.robot.description import ArmDescription, Inertia, Tool
-from contactsafe.robot.payload import Payload
+from contactsafe.robot.payload import Payload, set_inertia
 from contactsafe.robot.regressor import inertia_in_body, link_inertia, site_in_link
 
 
@@ -123,12 +123,7 @@ def _join(model: mujoco.MjModel, arm: Arm, load: Payload) -> None:
     if body != model.site_bodyid[model.site(arm.site).id]:  # it has taken up the others
         others = np.flatnonzero(model.body_weldid == body)
         model.body_mass[others], model.body_inertia[others] = 0.0, 0.0
-    moments, axes = np.linalg.eigh(joined.matrix())
-    axes[:, 2] *= np.linalg.det(axes)  # a rotation, not a mirror
-    model.body_mass[body], model.body_ipos[body] = joined.mass, joined.com
-    model.body_inertia[body], model.body_iquat[body] = np.maximum(moments, 0.0), matrix_to_quat(axes)
-    model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    set_inertia(model, body, joined)
 
 
 def _described(

@@ -81,10 +81,15 @@ def carrying(arm: Arm, load: Payload) -> Arm:
     joined = Inertia.of(
         float(model.body_mass[body]), model.body_ipos[body], own @ np.diag(model.body_inertia[body]) @ own.T
     ) + Inertia.of(load.mass, model.site_pos[site] + R @ load.com, R @ load.inertia @ R.T)
-    moments, axes = np.linalg.eigh(joined.matrix())
+    set_inertia(model, int(body), joined)
+    return replace(arm, model=model)
+
+
+def set_inertia(model: mujoco.MjModel, body: int, inertia: Inertia) -> None:
+    """Give a body of a model, in place, the mass properties that are known in its own frame."""
+    moments, axes = np.linalg.eigh(inertia.matrix())
     axes[:, 2] *= np.linalg.det(axes)  # a rotation, not a mirror
-    model.body_mass[body], model.body_ipos[body] = joined.mass, joined.com
+    model.body_mass[body], model.body_ipos[body] = inertia.mass, inertia.com
     model.body_inertia[body], model.body_iquat[body] = np.maximum(moments, 0.0), matrix_to_quat(axes)
     model.body_sameframe[body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    return replace(arm, model=model)
