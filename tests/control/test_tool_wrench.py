@@ -27,14 +27,18 @@ def wipe(arm, force, config=SAFE, ticks=2000):
 
 @pytest.mark.parametrize("force", [8.0, 20.0, 40.0])
 def test_board_under_the_tool_is_no_contact_of_the_arm(panda, force):
-    """Torques of the tool of 4 N m and more; what is held against the threshold is 0.07 N m."""
-    felt, highest = 0.0, 0.0
+    """Torques of the tool of 4 N m and more; what is held against the threshold is 0.05 N m.
+
+    Until the noise is known the detecting filters are slower, and it is 0.07 N m.
+    """
+    felt, held = 0.0, []
     for out, controller in wipe(panda, force):
         assert not out.contact.in_contact
         felt = max(felt, np.abs(out.contact.torque).max())
-        highest = max(highest, np.abs(controller.record["state"]["detection"]["residual"]).max())
+        held.append(np.abs(controller.record["state"]["detection"]["residual"]).max())
     assert felt > 0.2 * force
-    assert highest < 0.1
+    assert max(held[200:]) < 0.05
+    assert max(held) < 0.1
 
 
 def test_board_under_the_tool_is_a_contact_to_the_paper(panda):

@@ -97,7 +97,7 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if went_on:
         follow_noise(
             observer.noise, observer.raw, detection.model_uncertainty, observer.velocity.of_positions, state.step,
-            untouched, params.observer.residual_noise_nm,
+            untouched, _is_tool_free(state, params), params.observer.residual_noise_nm,
         )  # fmt: skip
     if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
         take_all_for_the_arm(tool, detection.residual, observer)
@@ -112,6 +112,15 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
         state.fault, state.limits.runaway = RUNAWAY, 1
     state.clock.since = 0.0
+
+
+@inlined
+def _is_tool_free(state: Record, params: Record) -> bool:
+    """Tell whether no contact of the tool is in the raw torque: a sensor takes it out, or it presses with little."""
+    if state.arm.has_wrench != 0 and params.observer.cancel_tool_wrench != 0:
+        return True
+    force, least = state.tool_wrench.force, params.classification.tool_contact_n
+    return dot(force, force) < least * least
 
 
 @inlined

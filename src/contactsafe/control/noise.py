@@ -62,7 +62,7 @@ def start_noise(noise: Record, allowed_nm: float) -> None:
 @inlined
 def follow_noise(
     noise: Record, raw: Vector, model_uncertainty: Vector, of_positions: int, step: Record, untouched: bool,
-    allowed_nm: float,
+    tool_free: bool, allowed_nm: float,
 ) -> None:  # fmt: skip
     """Measure the noise of the residual at full bandwidth, and set the bandwidth that keeps it to what is allowed.
 
@@ -73,6 +73,7 @@ def follow_noise(
         of_positions: whether any joint's velocity is a difference of positions.
         step: of the state.
         untouched: whether nothing touches the arm; else nothing is learned.
+        tool_free: whether no contact of the tool is in the torque; else no more noise is learned, only less.
         allowed_nm: standard deviation, N m; inf for any.
     """
     if not math.isfinite(allowed_nm):
@@ -81,13 +82,13 @@ def follow_noise(
     observer_step(noise.residual, step.full_lowpass_gain, noise.unfiltered)
     observer_step(noise.slow, filter_gain(_SLOW_1_S, step.dt), noise.residual)
     if untouched:
-        _learn(noise, model_uncertainty, step.dt, _FLOOR * allowed_nm)
+        _learn(noise, model_uncertainty, tool_free, step.dt, _FLOOR * allowed_nm)
     most = _OF_POSITIONS if of_positions != 0 else 1.0
     noise.bandwidth = min(max(allowed_nm / noise.sigma.max(), _LEAST_BANDWIDTH), most)
 
 
 @inlined
-def _learn(noise: Record, model_uncertainty: Vector, dt: float, least_nm: float) -> None:
+def _learn(noise: Record, model_uncertainty: Vector, tool_free: bool, dt: float, least_nm: float) -> None:
     """Follow the median of the noise, upwards or downwards by a fraction of itself.
 
     A push that begins moves it no faster than that, however hard it is.
@@ -98,7 +99,7 @@ def _learn(noise: Record, model_uncertainty: Vector, dt: float, least_nm: float)
     for i in range(noise.sigma.shape[0]):
         seen = abs(noise.residual[i] - noise.slow[i]) - model_uncertainty[i]
         if seen > _MEDIAN * noise.sigma[i]:
-            noise.sigma[i] *= factor
+            noise.sigma[i] *= factor if tool_free else 1.0
         elif guessed or model_uncertainty[i] < noise.sigma[i]:  # or motion hides the noise, and would have it forgotten
             noise.sigma[i] = max(noise.sigma[i] / factor, least_nm)
 
