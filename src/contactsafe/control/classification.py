@@ -16,6 +16,12 @@ from contactsafe.core.linalg import dot
 
 _f = np.float64
 
+_LEAST_J = 0.0005
+"""The least that anything is thought to have taken."""
+
+_STANDS_OUT_NM = 0.4
+"""A fall of the torque that noise does not show."""
+
 _CERTAIN = 4.0
 """A push once classified is one until so many times the probing displacement speaks for an obstacle."""
 
@@ -30,6 +36,9 @@ def classification_dtype(n: int) -> np.dtype:
             ("displacement_smooth_rad", _f),  # the same, smoothed
             ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
             ("reference_nm", _f),  # the same at the reference: where the arm last stopped moving into the contact
+            ("reference_j", _f),  # work that the contact had taken at most by then
+            ("advanced_rad", _f),  # by which the arm has moved into the contact since it last receded
+            ("before_nm", _f),  # contact torque before that
             ("decision_rad", _f),  # displacement at which the contact is classified next
         ]
     )
@@ -46,36 +55,55 @@ def follow_velocity(classification: Record, qd: Vector, step: Record) -> None:
 def begin_classification(classification: Record) -> None:
     """Begin with a contact of which nothing is known."""
     classification.displacement_rad, classification.displacement_smooth_rad = 0.0, 0.0
-    classification.torque_smooth_nm, classification.reference_nm = 0.0, 0.0
+    classification.torque_smooth_nm, classification.reference_nm, classification.reference_j = 0.0, 0.0, 0.0
+    classification.advanced_rad, classification.before_nm = 0.0, 0.0
     classification.decision_rad = math.inf
 
 
 @inlined
-def classify(classification: Record, isolation: Record, torque: Vector, mode: int, step: Record, params: Record) -> int:
+def classify(
+    classification: Record, isolation: Record, torque: Vector, active: bool, taken_j: float, doubt_nm: float, mode: int,
+    step: Record, params: Record,
+) -> int:
     """Return what the contact has shown itself to be in this tick: OBSTACLE, PUSH, or NO_CONTACT for nothing new.
 
     Args:
         classification: `classification_dtype` record; advanced.
         isolation: up to date; the longest lever arm is probed with, a short guess would let the arm be carried away.
         torque: of the contact on the arm, (n,), N m.
+        active: whether the contact has given the arm more work than it took.
+        taken_j: work that it has taken at most, J.
+        doubt_nm: by which the model's errors may have changed the contact's torque, N m.
         mode, step: in force.
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
+    if active:
+        return PUSH
     displacement, probe = classification.displacement_smooth_rad, params.probe_m / isolation.lever_max
+    softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
     if displacement <= 0.0:  # the arm moves into it
         classification.displacement_rad -= displacement
+        classification.advanced_rad -= displacement
         classification.displacement_smooth_rad = 0.0
-        classification.reference_nm = classification.torque_smooth_nm
+        classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
         classification.decision_rad, displacement = probe, 0.0
+        rise = classification.torque_smooth_nm - classification.before_nm
+        stiff = rise > max(0.5 * softest * classification.advanced_rad, _STANDS_OUT_NM + doubt_nm)
+        if mode == REJECT and stiff and classification.advanced_rad > _CERTAIN * probe:
+            return OBSTACLE
+    elif displacement > probe:
+        classification.advanced_rad, classification.before_nm = 0.0, classification.torque_smooth_nm
     classification.decision_rad = min(classification.decision_rad, displacement + probe)
     if displacement < classification.decision_rad:
         return NO_CONTACT
     classification.decision_rad = displacement + probe
     drop = classification.reference_nm - classification.torque_smooth_nm
-    if is_push(drop, displacement, isolation.lever, params.obstacle_stiffness_min):
+    if goes_on(drop, displacement, classification.reference_nm, classification.reference_j, doubt_nm):
         return PUSH
-    return NO_CONTACT if mode == REJECT and displacement < _CERTAIN * probe else OBSTACLE
+    if drop < 0.5 * softest * displacement or (mode == REJECT and displacement < _CERTAIN * probe):
+        return NO_CONTACT
+    return OBSTACLE
 
 
 @inlined
@@ -89,19 +117,20 @@ def _follow_contact(classification: Record, direction: Vector, torque: Vector, s
 
 
 @compiled
-def is_push(drop: float, displacement: float, lever: float, stiffness: float) -> bool:
+def goes_on(drop: float, displacement: float, torque: float, taken_j: float, doubt_nm: float) -> bool:
     """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
-    The torque of a spring of k N/m at a lever arm of l falls by k l² for every radian that the arm recedes; a push goes
-    on. Half the fall that the softest obstacle would show draws the line.
+    A spring that took A joules to come to a torque of τ loses τ² / (2 A) for every radian that the arm recedes; a push
+    goes on. Half of that draws the line, and it must stand out.
 
     Args:
         drop: by which the contact's torque has fallen, N m.
         displacement: by which the arm has receded along the contact's direction meanwhile, rad.
-        lever: of the contact, m.
-        stiffness: of the softest thing that counts as an obstacle, N/m.
+        torque: of the contact before, N m.
+        taken_j: work that it had taken at most before, J.
     """
-    return drop < 0.5 * stiffness * lever * lever * displacement
+    expected = min(0.5 * torque * torque / max(taken_j, _LEAST_J) * displacement, torque)
+    return drop < 0.5 * expected - _STANDS_OUT_NM - doubt_nm
 
 
 @compiled

@@ -10,6 +10,7 @@ import numpy as np
 from contactsafe.control.classification import contact_kind
 from contactsafe.control.clock import narrow_band, receive, set_step
 from contactsafe.control.codes import BAD_MEASUREMENT, FREE, LOAD, RUNAWAY
+from contactsafe.control.contact_work import is_active
 from contactsafe.control.detection import set_thresholds
 from contactsafe.control.laws import task_inertia
 from contactsafe.control.limits import runs_away
@@ -27,7 +28,7 @@ from contactsafe.control.payload import (
 from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.supervision import supervise
 from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
-from contactsafe.control.touch import follow_touch
+from contactsafe.control.touch import follow_change, follow_touch
 from contactsafe.control.velocity import follow_velocities
 from contactsafe.core.arrays import Matrix, Record
 from contactsafe.core.compiled import compiled, inlined
@@ -102,8 +103,12 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:
-        memory_gain = state.step.tool_memory_gain if state.mode == FREE else 0.0
-        separate_tool_wrench(tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, params.identification)
+        pushed = is_active(state.contact_work)
+        memory_gain = state.step.tool_memory_gain if state.mode == FREE and not pushed else 0.0
+        separate_tool_wrench(
+            tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, pushed, params.identification
+        )
+    follow_change(c)
     supervise(c)
     _identify(c)
     if _has_unknown_load(c) and state.clock.braking == 0 and state.limits.runaway == 0:
@@ -183,7 +188,9 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
     report_arm(c)
     if c.state.clock.bridged > 0:
         return
-    follow_tool_force(c.state.tool_wrench, c.state.arm, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain)
+    follow_tool_force(
+        c.state.tool_wrench, c.state.arm, c.state.mode, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain
+    )
     follow_touch(c)
     _report_touch(c.state, c.output)
 

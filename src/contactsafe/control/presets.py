@@ -49,7 +49,7 @@ SAFE: dict[str, tuple[float | bool | str, str]] = {
     "contact_damping": (5.0, "takes out what an impact leaves in the joints; half of D_posture"),
     "approach_damping": (150.0, "stops the motion into an obstacle as fast as the sampled loop stays stable"),
     "contact_torque_limit_comply_nm": (2.0, "just above δ, so that the contact stays detected while the arm complies"),
-    "contact_torque_limit_reject_nm": (22.0, "a push of 45 N at half a metre"),
+    "contact_torque_limit_reject_nm": (45.0, "a push of 45 N at half a metre"),
     "contact_force_limit_comply_n": (2.5, "less than what pushes a light obstacle along"),
     "contact_force_limit_initial_n": (17.0, "a push that begins must not displace the tool before it is classified"),
     "tool_force_limit_n": (20.0, "room for what a tool needs; a policy can press with no more"),

@@ -38,7 +38,9 @@ def begin_reaction(reaction: Record) -> None:
 
 
 @inlined
-def react(reaction: Record, mode: int, shown: int, torque_nm: float, dt: float, params: Record) -> int:
+def react(
+    reaction: Record, mode: int, shown: int, torque_nm: float, lever: float, dt: float, params: Record
+) -> int:
     """Return the mode that what a contact has shown asks for, and let the bounds in force fall.
 
     Args:
@@ -56,7 +58,8 @@ def react(reaction: Record, mode: int, shown: int, torque_nm: float, dt: float, 
         fallen = 0.5 * (1.0 + params.reject_margin) * torque_nm
         if mode == COMPLY or reaction.reject_limit_nm < fallen:  # it receded because the bound had fallen
             reaction.reject_decay_s = max(2.0 * reaction.reject_decay_s, params.reject_decay_s)
-        mode, reaction.reject_limit_nm = REJECT, params.reject_margin * torque_nm
+        mode = REJECT
+        reaction.reject_limit_nm = max(params.reject_margin * torque_nm, 60.0 * lever)
     elif shown == OBSTACLE:
         mode, reaction.reject_decay_s, reaction.reject_limit_nm, reaction.initial_limit_n = COMPLY, 0.0, 0.0, 0.0
     if mode == REJECT:

@@ -12,6 +12,7 @@ from contactsafe.control.baseline import baseline_dtype
 from contactsafe.control.classification import classification_dtype
 from contactsafe.control.clock import clock_dtype
 from contactsafe.control.codes import FREE, NO_CONTACT, REJECT, TOOL
+from contactsafe.control.contact_work import contact_work_dtype
 from contactsafe.control.detection import detection_dtype
 from contactsafe.control.impedance import impedance_dtype
 from contactsafe.control.isolation import isolation_dtype
@@ -102,11 +103,12 @@ def state_dtype(n: int) -> np.dtype:
             ("isolation", isolation_dtype(n)),
             ("tool_wrench", tool_wrench_dtype(n)),
             ("baseline", baseline_dtype(n)),
-            ("touch", touch_dtype),
+            ("touch", touch_dtype(n)),
             ("localisation", localisation_dtype(n)),
             ("link_masses", link_masses_dtype(n)),
             ("payload", payload_dtype),
             ("classification", classification_dtype(n)),
+            ("contact_work", contact_work_dtype(n)),
             ("reaction", reaction_dtype),
             ("impedance", impedance_dtype(n)),
             ("limits", limits_dtype(n)),

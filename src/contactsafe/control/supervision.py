@@ -2,6 +2,7 @@
 
 from contactsafe.control.classification import begin_classification, classify, follow_velocity
 from contactsafe.control.codes import COMPLY, FREE
+from contactsafe.control.contact_work import follow_work, is_active, stored_at_most
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
@@ -26,11 +27,31 @@ def supervise(c: Record) -> None:
     if state.mode != FREE and link != 0:
         isolate(state.isolation, c.handle, link, torque, params.arm.lever_doubted)
     follow_velocity(state.classification, state.arm.qd, state.step)
+    _follow_work(state, params.classification.obstacle_stiffness_min)
     if state.mode != FREE:
-        shown = classify(state.classification, state.isolation, torque, state.mode, state.step, params.classification)
+        doubt_nm = 0.0
+        for i in range(torque.shape[0]):
+            doubt_nm += abs(state.isolation.direction[i]) * state.detection.model_uncertainty[i]
+        shown = classify(
+            state.classification, state.isolation, torque, is_active(state.contact_work), state.contact_work.taken_j,
+            doubt_nm, state.mode, state.step, params.classification,
+        )  # fmt: skip
         along = state.classification.torque_smooth_nm
-        state.mode = react(state.reaction, state.mode, shown, along, state.step.dt, params.reaction)
+        state.mode = react(state.reaction, state.mode, shown, along, state.isolation.lever_max, state.step.dt, params.reaction)
     c.output.link = state.isolation.link if state.mode != FREE and state.isolation.link != 0 else link
+
+
+@inlined
+def _follow_work(state: Record, softest: float) -> None:
+    """Follow the work of whatever acts on the arm, also before it is found to be a contact."""
+    stored = 0.0
+    if state.mode != FREE:
+        stored = stored_at_most(state.classification.torque_smooth_nm, state.isolation.lever, softest)
+    touch, velocity = state.touch, state.classification.velocity
+    follow_work(
+        state.contact_work, touch.torque, touch.sigma, state.detection.model_uncertainty, velocity, state.mode != FREE,
+        stored, state.step.dt,
+    )  # fmt: skip
 
 
 @compiled

@@ -117,7 +117,7 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
-    follow_tool_force(tool, arm, state.observer.residual_fast, J_bar, state.step.probe_gain)
+    follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain)
     scale, reason = contact_bound.tool_task_scale(
         F_spring, tool.force, params.classification.tool_contact_n, params.reaction.tool_force_limit_n
     )
@@ -151,7 +151,8 @@ def _contact_law(
     compensated = contact_bound.bound_compensation(compensation, direction, M_inv, limit)
     left = limit - max(min(compensated, limit), 0.0)
     asked = torque_against_contact(direction, M_inv, elastic)
-    scale, reason = contact_bound.scale_of_task(asked, left, scale, reason)
+    if state.mode == COMPLY:
+        scale, reason = contact_bound.scale_of_task(asked, left, scale, reason)
     contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)
     tau = state.reaction.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
     c.output.contact_command_nm, c.output.contact_limit_nm = compensated + asked, limit

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import inlined
@@ -31,12 +32,14 @@ def separate_tool_wrench(
     J: Matrix,
     J_bar: Matrix,
     memory_gain: float,
+    pushed: bool,
     params: Record,
 ) -> None:
     """Split the residual into the tool's part and the arm's, where no force sensor does.
 
     A wrench at the tool never shows in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force
-    whose line passes far from the tool; of the rest, the wrench that was there before the contact stays the tool's.
+    whose line passes far from the tool, and what does work on the arm: no matter where somebody pushes, it is to be held.
+    Of the rest, the wrench that was there before the contact stays the tool's.
 
     Args:
         tool: `tool_wrench_dtype` record; advanced.
@@ -45,18 +48,21 @@ def separate_tool_wrench(
         J: task Jacobian, (6, n).
         J_bar: its dynamically consistent inverse, (n, 6).
         memory_gain: of the tool's wrench in this tick; 0 while the arm is in contact.
+        pushed: whether the contact has given the arm more work than it took.
         params: of identification.
     """
     n = detection_residual.shape[0]
     tau_tool = stack_vector(n)
     wrench = matvec_t_into(J_bar, observer.residual_fast, stack_vector(6))
     detection_residual[:] = observer.residual_fast
-    if not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
+    if memory_gain > 0.0:
+        observer_step(tool.wrench, memory_gain, wrench)
+    if pushed:
+        wrench[:] = tool.wrench
+    if pushed or not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
         matvec_t_into(J, wrench, tau_tool)
         for i in range(n):
             detection_residual[i] -= tau_tool[i]
-    if memory_gain > 0.0:
-        observer_step(tool.wrench, memory_gain, wrench)
     matvec_t_into(J, tool.wrench, tau_tool)
     for i in range(n):
         tool.arm_torque[i] = observer.residual[i] - tau_tool[i]
@@ -72,11 +78,18 @@ def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Rec
 
 
 @inlined
-def follow_tool_force(tool: Record, arm: Record, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
-    """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r."""
+def follow_tool_force(
+    tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float
+) -> None:
+    """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
+
+    While something touches the arm, that is the force of before.
+    """
     wrench = stack_vector(6)
     if arm.has_wrench != 0:
         wrench[:] = arm.wrench_ee
+    elif mode != FREE:
+        wrench[:] = tool.wrench
     else:
         matvec_t_into(J_bar, residual_fast, wrench)
     observer_step(tool.force, gain, wrench[:3])

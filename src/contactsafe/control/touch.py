@@ -9,10 +9,9 @@ from contactsafe.control.codes import FREE, NO_CONTACT, OBSTACLE, PUSH, REJECT, 
 from contactsafe.control.detection import GRAVITY_SIGMAS
 from contactsafe.control.evidence import Uncertainty, moment_variance
 from contactsafe.control.localisation import forget_place, localise
-from contactsafe.core.arrays import Record, Vector
+from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import inlined
 from contactsafe.core.linalg import dot
-from contactsafe.core.stack import stack_vector
 
 _f = np.float64
 _i = np.int64
@@ -30,16 +29,20 @@ _LEAST_NM, _ELSEWHERE_NM, _SCALE = 0.05, 0.2, 0.02
 _MODEL_SIGMAS = 2.0
 """The model's uncertainty is taken for so many standard deviations."""
 
-touch_dtype = np.dtype(
-    [
-        ("touching", _i),
-        ("ticks", _i),  # since it began or ended
-        ("quiet_ticks", _i),  # since the residual was above what keeps a contact
-        ("kind", _i),  # key of KINDS
-        ("probability", _f),  # of it
-    ]
-)
-"""What is remembered of whatever touches."""
+
+def touch_dtype(n: int) -> np.dtype:
+    """Describe what is remembered of whatever touches."""
+    return np.dtype(
+        [
+            ("touching", _i),
+            ("ticks", _i),  # since it began or ended
+            ("quiet_ticks", _i),  # since the residual was above what keeps a contact
+            ("kind", _i),  # key of KINDS
+            ("probability", _f),  # of it
+            ("torque", _f, (n,)),  # fast residual less its baseline, N m
+            ("sigma", _f, (n,)),  # its standard deviation, N m
+        ]
+    )
 
 
 @inlined
@@ -51,9 +54,7 @@ def follow_touch(c: Record) -> None:
     """
     state, params = c.state, c.params
     touch, place = state.touch, state.localisation
-    n = state.arm.q.shape[0]
-    changed, sigma = stack_vector(n), stack_vector(n)
-    shows = _change_into(c, changed, sigma)
+    shows = _shows(c)
     ticks = max(round(state.step.ticks), 1)
     touch.ticks += ticks
     touch.quiet_ticks = 0 if shows else touch.quiet_ticks + ticks
@@ -64,8 +65,8 @@ def follow_touch(c: Record) -> None:
         touch.touching, touch.ticks = 1 if began else 0, 0
         forget_place(place, state.arm.q)
     if touch.touching != 0 and c.handle.place_points > c.handle.tool_places:
-        known = Uncertainty(sigma, moment_variance(changed))
-        localise(place, c.handle, changed, known, state.arm.q, _tool_prior(state, params.observer), state.step.dt)
+        known = Uncertainty(touch.sigma, moment_variance(touch.torque))
+        localise(place, c.handle, touch.torque, known, state.arm.q, _tool_prior(state, params.observer), state.step.dt)
     touch.kind, touch.probability = _kind(touch, place, state, params.classification.tool_contact_n)
 
 
@@ -79,25 +80,37 @@ def _tool_prior(state: Record, params: Record) -> float:
 
 
 @inlined
-def _change_into(c: Record, changed: Vector, sigma: Vector) -> bool:
-    """Fill the residual less its baseline, and its standard deviation, (n,), N m; tell whether it shows a touch."""
+def follow_change(c: Record) -> None:
+    """Learn the residual's baseline while nothing touches; set what it shows beyond that, and how well that is known.
+
+    Args:
+        c: `controller_dtype` record, its model uncertainty and noise up to date.
+    """
     state = c.state
     observer, detection, touch, baseline = state.observer, state.detection, state.touch, state.baseline
-    follow_baseline(
-        baseline, observer.residual_fast, state.arm.q, touch.touching == 0 and state.mode == FREE, state.step.dt
-    )
-    keep = c.params.detection.release_fraction if touch.touching != 0 else 1.0
-    shows = False
-    for i in range(changed.shape[0]):
-        gravity, model = state.link_masses.gravity_sigma[i], detection.model_uncertainty[i]
-        left = (1.0 - baseline.weight) * gravity
-        changed[i] = observer.residual_fast[i] - baseline.weight * baseline.residual[i]
+    untouched = touch.touching == 0 and state.mode == FREE
+    follow_baseline(baseline, observer.residual_fast, state.arm.q, untouched, state.step.dt)
+    for i in range(touch.torque.shape[0]):
+        changed = observer.residual_fast[i] - baseline.weight * baseline.residual[i]
+        left = (1.0 - baseline.weight) * state.link_masses.gravity_sigma[i]
         noise = observer.noise.bandwidth * observer.noise.sigma[i]
         bias = (1.0 - baseline.weight) * _ELSEWHERE_NM
-        variance = _LEAST_NM**2 + noise * noise + bias * bias + (model / _MODEL_SIGMAS) ** 2 + left * left
-        sigma[i] = math.sqrt(variance + (_SCALE * changed[i]) ** 2)
-        threshold = detection.threshold[i] - GRAVITY_SIGMAS * (gravity - left)
-        shows = shows or abs(changed[i]) > keep * threshold
+        model = detection.model_uncertainty[i] / _MODEL_SIGMAS
+        variance = _LEAST_NM**2 + noise * noise + bias * bias + model * model + left * left
+        touch.torque[i], touch.sigma[i] = changed, math.sqrt(variance + (_SCALE * changed) ** 2)
+
+
+@inlined
+def _shows(c: Record) -> bool:
+    """Tell whether the residual or its change shows a touch: above the threshold, or what keeps one."""
+    state = c.state
+    observer, detection, touch = state.observer, state.detection, state.touch
+    keep = c.params.detection.release_fraction if touch.touching != 0 else 1.0
+    shows = False
+    for i in range(touch.torque.shape[0]):
+        known = state.baseline.weight * state.link_masses.gravity_sigma[i]  # is in the baseline
+        threshold = detection.threshold[i] - GRAVITY_SIGMAS * known
+        shows = shows or abs(touch.torque[i]) > keep * threshold
         shows = shows or abs(observer.residual_fast[i]) > keep * detection.threshold[i]
     return shows
 

@@ -1,0 +1,84 @@
+"""Work: what a contact has done on the arm. A passive thing gives back no more than it took; who pushes does.
+
+An arm that runs into something does work on it, an arm that is pushed has work done on it, so the sign of the work
+tells a push from an obstacle without waiting for the arm to give way: the passivity of the environment (Hogan 1985).
+"""
+
+import math
+
+import numpy as np
+
+from contactsafe.core.arrays import Record, Vector
+from contactsafe.core.compiled import compiled, inlined
+
+_f = np.float64
+
+_MEMORY_S, _MEMORY_RAD = 0.5, 0.03
+"""Work is forgotten within such a time and, while nothing touches, within such a motion: it is no contact's."""
+
+_GIVEN_J = 0.002
+"""What errors of the torque may feign."""
+
+_SIGMAS = 2.0
+"""Standard deviations by which the work may be wrong."""
+
+
+def contact_work_dtype(n: int) -> np.dtype:
+    """Describe what is remembered of the work between the arm and what touches it."""
+    return np.dtype(
+        [
+            ("done_j", _f),  # by the contact on the arm
+            ("moved_rad", _f, (n,)),  # by which each joint moved meanwhile
+            ("doubt_j", _f),  # by which the model's errors in motion may have made it wrong
+            ("taken_j", _f),  # by the contact from the arm, at most; negative where it has given more than it took
+        ]
+    )
+
+
+@inlined
+def follow_work(
+    work: Record, torque: Vector, sigma: Vector, model: Vector, velocity: Vector, in_contact: bool, stored_j: float,
+    dt: float,
+) -> None:
+    """Add the work of one tick, and forget what no contact can still give back.
+
+    Args:
+        work: `contact_work_dtype` record; advanced.
+        torque: of the contact on the arm, (n,), N m.
+        sigma: its standard deviation, (n,), N m.
+        model: uncertainty of the arm's model in motion, (n,), N m.
+        velocity: of the joints, in step with the torque, (n,), rad/s.
+        in_contact: whether something touches.
+        stored_j: most that a passive thing can hold back at this torque.
+        dt: that passed, s.
+    """
+    moved = 0.0
+    for i in range(torque.shape[0]):
+        work.done_j += dt * torque[i] * velocity[i]
+        work.moved_rad[i] += dt * velocity[i]
+        moved += velocity[i] * velocity[i]
+        work.doubt_j += dt * model[i] * abs(velocity[i])
+    nearest = min(max(work.done_j, -stored_j if in_contact else 0.0), 0.0)
+    if work.done_j != nearest:
+        keep = math.exp(-dt / _MEMORY_S - (0.0 if in_contact else dt * math.sqrt(moved) / _MEMORY_RAD))
+        work.doubt_j *= keep
+        work.done_j = nearest + keep * (work.done_j - nearest)
+        for i in range(torque.shape[0]):
+            work.moved_rad[i] *= keep
+    variance = 0.0
+    for i in range(torque.shape[0]):
+        variance += (sigma[i] * work.moved_rad[i]) ** 2
+    work.taken_j = _SIGMAS * math.sqrt(variance) + work.doubt_j - work.done_j
+
+
+@inlined
+def is_active(work: Record) -> bool:
+    """Tell whether the contact has given the arm more than it took: somebody pushes."""
+    return work.taken_j < -_GIVEN_J
+
+
+@compiled
+def stored_at_most(torque: float, lever: float, stiffness: float) -> float:
+    """Return what a spring of a stiffness in N/m holds at a torque in N m at a lever arm in m, τ² / (2 k l²), J."""
+    force = torque / lever
+    return 0.5 * force * force / stiffness
