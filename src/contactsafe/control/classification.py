@@ -19,8 +19,8 @@ _f = np.float64
 _LEAST_J = 0.0005
 """The least that anything is thought to have taken."""
 
-_STANDS_OUT_NM = 0.4
-"""A fall of the torque that noise does not show."""
+_STANDS_OUT_NM, _LOST = 0.4, 0.25
+"""A change of the torque that noise does not show; and the part of it that must be lost before a push is none."""
 
 _CERTAIN = 4.0
 """A push once classified is one until so many times the probing displacement speaks for an obstacle."""
@@ -37,9 +37,9 @@ def classification_dtype(n: int) -> np.dtype:
             ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
             ("reference_nm", _f),  # the same at the reference: where the arm last stopped moving into the contact
             ("reference_j", _f),  # work that the contact had taken at most by then
+            ("decision_rad", _f),  # displacement at which the contact is asked again whether it goes on
             ("advanced_rad", _f),  # by which the arm has moved into the contact since it last receded
             ("before_nm", _f),  # contact torque before that
-            ("decision_rad", _f),  # displacement at which the contact is classified next
         ]
     )
 
@@ -57,7 +57,7 @@ def begin_classification(classification: Record) -> None:
     classification.displacement_rad, classification.displacement_smooth_rad = 0.0, 0.0
     classification.torque_smooth_nm, classification.reference_nm, classification.reference_j = 0.0, 0.0, 0.0
     classification.advanced_rad, classification.before_nm = 0.0, 0.0
-    classification.decision_rad = math.inf
+    classification.decision_rad = 0.0
 
 
 @inlined
@@ -78,32 +78,36 @@ def classify(
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
-    if active:
-        return PUSH
     displacement, probe = classification.displacement_smooth_rad, params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
-    if displacement <= 0.0:  # the arm moves into it
-        classification.displacement_rad -= displacement
-        classification.advanced_rad -= displacement
-        classification.displacement_smooth_rad = 0.0
-        classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
-        classification.decision_rad, displacement = probe, 0.0
+    if displacement <= 0.0:
+        _advance(classification, taken_j, probe)
         rise = classification.torque_smooth_nm - classification.before_nm
-        stiff = rise > max(0.5 * softest * classification.advanced_rad, _STANDS_OUT_NM + doubt_nm)
-        if mode == REJECT and stiff and classification.advanced_rad > _CERTAIN * probe:
+        pressed = mode == REJECT and rise > classification.before_nm and classification.advanced_rad > _CERTAIN * probe
+        if pressed and not active and is_stiff(rise, classification.advanced_rad, softest, doubt_nm):
             return OBSTACLE
-    elif displacement > probe:
+    if displacement > probe or active:
         classification.advanced_rad, classification.before_nm = 0.0, classification.torque_smooth_nm
-    classification.decision_rad = min(classification.decision_rad, displacement + probe)
-    if displacement < classification.decision_rad:
-        return NO_CONTACT
-    classification.decision_rad = displacement + probe
-    drop = classification.reference_nm - classification.torque_smooth_nm
-    if goes_on(drop, displacement, classification.reference_nm, classification.reference_j, doubt_nm):
-        return PUSH
-    if drop < 0.5 * softest * displacement or (mode == REJECT and displacement < _CERTAIN * probe):
-        return NO_CONTACT
-    return OBSTACLE
+    if displacement <= 0.0:
+        return PUSH if active else NO_CONTACT
+    drop, torque_before = classification.reference_nm - classification.torque_smooth_nm, classification.reference_nm
+    if mode == COMPLY and displacement > probe and is_stiff(drop, displacement, softest, doubt_nm):
+        return OBSTACLE
+    if mode == REJECT and displacement > _CERTAIN * probe and drop > _LOST * torque_before:
+        return OBSTACLE if is_stiff(drop, displacement, softest, doubt_nm) else NO_CONTACT
+    if displacement > classification.decision_rad:
+        classification.decision_rad = displacement + probe
+        active = active or goes_on(drop, displacement, torque_before, classification.reference_j, doubt_nm)
+    return PUSH if active else NO_CONTACT
+
+
+@inlined
+def _advance(classification: Record, taken_j: float, probe: float) -> None:
+    """Begin anew where the arm moves into the contact."""
+    classification.advanced_rad -= classification.displacement_smooth_rad
+    classification.displacement_rad -= classification.displacement_smooth_rad
+    classification.displacement_smooth_rad, classification.decision_rad = 0.0, probe
+    classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
 
 
 @inlined
@@ -114,6 +118,19 @@ def _follow_contact(classification: Record, direction: Vector, torque: Vector, s
     classification.torque_smooth_nm += step.probe_gain * (along - classification.torque_smooth_nm)
     change = classification.displacement_rad - classification.displacement_smooth_rad
     classification.displacement_smooth_rad += step.probe_gain * change
+
+
+@compiled
+def is_stiff(change: float, displacement: float, softest: float, doubt_nm: float) -> bool:
+    """Tell an obstacle by its stiffness: the torque changes with the displacement, and the change stands out.
+
+    Args:
+        change: of the contact's torque, as a spring would change it, N m.
+        displacement: of the arm along the contact's direction meanwhile, rad.
+        softest: thing that counts as an obstacle, k l², N m/rad; half of that draws the line.
+        doubt_nm: by which the model's errors may have changed the torque, N m.
+    """
+    return change > max(0.5 * softest * displacement, _STANDS_OUT_NM + doubt_nm)
 
 
 @compiled
@@ -128,6 +145,7 @@ def goes_on(drop: float, displacement: float, torque: float, taken_j: float, dou
         displacement: by which the arm has receded along the contact's direction meanwhile, rad.
         torque: of the contact before, N m.
         taken_j: work that it had taken at most before, J.
+        doubt_nm: by which the model's errors may have changed the torque, N m.
     """
     expected = min(0.5 * torque * torque / max(taken_j, _LEAST_J) * displacement, torque)
     return drop < 0.5 * expected - _STANDS_OUT_NM - doubt_nm

@@ -129,7 +129,10 @@ class ReactionConfig(Stage):
     contact_force_limit_comply_n: float = parameter(
         _INF, "N", "the bound of mode COMPLY as a force at the link in contact; the smaller one counts", infinite=True
     )
-    contact_force_limit_reject_n: float = parameter(_INF, "N", "the same in mode REJECT", infinite=True)
+    reject_force_n: float = parameter(
+        0.0, "N", "force at the longest lever arm that the contact may have: up to which mode REJECT resists a push at "
+        "least", infinite=True,
+    )  # fmt: skip
     contact_force_limit_initial_n: float = parameter(
         20.0, "N", "the bound when a contact begins; it falls exponentially, and from "
         "`contact_force_limit_comply_n` on that one is in force",
@@ -138,7 +141,9 @@ class ReactionConfig(Stage):
     tool_force_limit_n: float = parameter(
         _INF, "N", "largest commanded force of the tool against what it touches", infinite=True
     )
-    reject_margin: float = parameter(2.0, "", "multiple of a push's torque up to which mode REJECT resists it")
+    reject_margin: float = parameter(
+        2.0, "", "multiple of a push's torque up to which mode REJECT resists it at least, within its limit in N m"
+    )
     reject_decay_s: float = parameter(
         0.5, "s", "time constant with which that bound falls, to find out whether the push goes on; doubled each time",
         positive=True,
@@ -151,13 +156,12 @@ class ReactionConfig(Stage):
             InvalidInputError: as it says.
         """
         super().__post_init__()
-        for stem, unit in (("contact_torque_limit", "nm"), ("contact_force_limit", "n")):
-            lower, higher = (f"{stem}_{mode}_{unit}" for mode in ("comply", "reject"))
-            if getattr(self, higher) < getattr(self, lower):
-                raise InvalidInputError(
-                    f"{higher} = {getattr(self, higher)} is below {lower} = {getattr(self, lower)}; "
-                    "the bound of mode REJECT may be the higher one, never the lower"
-                )
+        lower, higher = self.contact_torque_limit_comply_nm, self.contact_torque_limit_reject_nm
+        if higher < lower:
+            raise InvalidInputError(
+                f"contact_torque_limit_reject_nm = {higher} is below contact_torque_limit_comply_nm = {lower}; "
+                "the bound of mode REJECT may be the higher one, never the lower"
+            )
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,20 @@ WHOLE = 0.99
 def contact_limit(reaction: Record, isolation: Record, params: Record) -> float:
     """Return the bound in force, N m: a torque, and what a force comes to with the lever arm that isolation found."""
     comply = min(params.contact_torque_limit_comply_nm, params.contact_force_limit_comply_n * isolation.lever)
-    reject = max(
-        reaction.initial_limit_n * isolation.lever_max,
-        min(reaction.reject_limit_nm, params.contact_force_limit_reject_n * isolation.lever_max),
-    )
+    reject = max(reaction.initial_limit_n * isolation.lever_max, reaction.reject_limit_nm)
     return max(comply, min(reject, params.contact_torque_limit_reject_nm))
+
+
+@inlined
+def reject_limit(torque_nm: float, isolation: Record, params: Record) -> float:
+    """Return the bound with which a push is resisted at first, N m.
+
+    Args:
+        torque_nm: of the push along its direction, N m.
+        isolation: up to date; a lever arm too long does no harm, one too short would let the push carry the arm away.
+        params: of reaction.
+    """
+    return max(params.reject_force_n * isolation.lever_max, params.reject_margin * torque_nm)
 
 
 @inlined

@@ -16,8 +16,8 @@ _f = np.float64
 _MEMORY_S, _MEMORY_RAD = 0.5, 0.03
 """Work is forgotten within such a time and, while nothing touches, within such a motion: it is no contact's."""
 
-_GIVEN_J = 0.002
-"""What errors of the torque may feign."""
+_GIVEN_J, _CREDIT_J = 0.002, 0.01
+"""What errors of the torque may feign; and the most that is remembered of what was given: a push is over at once."""
 
 _SIGMAS = 2.0
 """Standard deviations by which the work may be wrong."""
@@ -68,7 +68,14 @@ def follow_work(
     variance = 0.0
     for i in range(torque.shape[0]):
         variance += (sigma[i] * work.moved_rad[i]) ** 2
+    work.done_j = min(work.done_j, _CREDIT_J + work.doubt_j)
     work.taken_j = _SIGMAS * math.sqrt(variance) + work.doubt_j - work.done_j
+
+
+@compiled
+def take_for_passive(work: Record, stored_j: float) -> None:
+    """Forget what the contact has given: it has shown itself to be passive, and may hold back so much, J."""
+    work.done_j = min(work.done_j, -stored_j)
 
 
 @inlined

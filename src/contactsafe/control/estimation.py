@@ -12,7 +12,7 @@ from contactsafe.control.clock import narrow_band, receive, set_step
 from contactsafe.control.codes import BAD_MEASUREMENT, FREE, LOAD, RUNAWAY
 from contactsafe.control.contact_work import is_active
 from contactsafe.control.detection import set_thresholds
-from contactsafe.control.laws import task_inertia
+from contactsafe.control.laws import line_of_action_misses_tool, task_inertia
 from contactsafe.control.limits import runs_away
 from contactsafe.control.link_masses import correct_gravity, identify_link_masses, start_link_masses
 from contactsafe.control.noise import follow_noise
@@ -32,9 +32,13 @@ from contactsafe.control.touch import follow_change, follow_touch
 from contactsafe.control.velocity import follow_velocities
 from contactsafe.core.arrays import Matrix, Record
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import dot, matmul
+from contactsafe.core.linalg import dot, matmul, matvec_t_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
+
+
+_SIGMAS = 2.0
+"""Standard deviations of the residual that the moment at the tool may be wrong by."""
 
 
 @compiled
@@ -103,7 +107,7 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:
-        pushed = is_active(state.contact_work)
+        pushed = is_active(state.contact_work) and _is_beside_tool(state, J_bar, params.identification)
         memory_gain = state.step.tool_memory_gain if state.mode == FREE and not pushed else 0.0
         separate_tool_wrench(
             tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, pushed, params.identification
@@ -117,6 +121,17 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if runs_away(state.limits, state.arm.qd, dynamics.M, state.step.dt, params.arm):
         state.fault, state.limits.runaway = RUNAWAY, 1
     state.clock.since = 0.0
+
+
+@inlined
+def _is_beside_tool(state: Record, J_bar: Matrix, params: Record) -> bool:
+    """Tell whether what has changed since nothing touched passes the tool by: less margin than in motion is needed."""
+    touch, sigma = state.touch, 0.0
+    change = matvec_t_into(J_bar, touch.torque, stack_vector(6))
+    for i in range(touch.sigma.shape[0]):
+        sigma += touch.sigma[i] * touch.sigma[i]
+    margin = min(_SIGMAS * math.sqrt(sigma), params.tool_moment_nm)
+    return line_of_action_misses_tool(change, params.tool_radius_m, margin)
 
 
 @inlined

@@ -39,7 +39,7 @@ def begin_reaction(reaction: Record) -> None:
 
 @inlined
 def react(
-    reaction: Record, mode: int, shown: int, torque_nm: float, lever: float, dt: float, params: Record
+    reaction: Record, mode: int, shown: int, torque_nm: float, limit_nm: float, dt: float, params: Record
 ) -> int:
     """Return the mode that what a contact has shown asks for, and let the bounds in force fall.
 
@@ -48,6 +48,7 @@ def react(
         mode: so far, COMPLY or REJECT.
         shown: what `classify` returned.
         torque_nm: of the contact along its direction, N m.
+        limit_nm: bound with which mode REJECT begins, N m.
         dt: that passed, s.
         params: of reaction.
     """
@@ -58,8 +59,7 @@ def react(
         fallen = 0.5 * (1.0 + params.reject_margin) * torque_nm
         if mode == COMPLY or reaction.reject_limit_nm < fallen:  # it receded because the bound had fallen
             reaction.reject_decay_s = max(2.0 * reaction.reject_decay_s, params.reject_decay_s)
-        mode = REJECT
-        reaction.reject_limit_nm = max(params.reject_margin * torque_nm, 60.0 * lever)
+        mode, reaction.reject_limit_nm = REJECT, limit_nm
     elif shown == OBSTACLE:
         mode, reaction.reject_decay_s, reaction.reject_limit_nm, reaction.initial_limit_n = COMPLY, 0.0, 0.0, 0.0
     if mode == REJECT:

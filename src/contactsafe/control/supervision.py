@@ -1,12 +1,13 @@
 """From detection to the mode: what each stage says of a contact, in order."""
 
 from contactsafe.control.classification import begin_classification, classify, follow_velocity
-from contactsafe.control.codes import COMPLY, FREE
-from contactsafe.control.contact_work import follow_work, is_active, stored_at_most
+from contactsafe.control.codes import COMPLY, FREE, OBSTACLE
+from contactsafe.control.contact_bound import reject_limit
+from contactsafe.control.contact_work import follow_work, take_for_passive, is_active, stored_at_most
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
-from contactsafe.core.arrays import Record
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 
 
@@ -29,29 +30,42 @@ def supervise(c: Record) -> None:
     follow_velocity(state.classification, state.arm.qd, state.step)
     _follow_work(state, params.classification.obstacle_stiffness_min)
     if state.mode != FREE:
-        doubt_nm = 0.0
-        for i in range(torque.shape[0]):
-            doubt_nm += abs(state.isolation.direction[i]) * state.detection.model_uncertainty[i]
-        shown = classify(
-            state.classification, state.isolation, torque, is_active(state.contact_work), state.contact_work.taken_j,
-            doubt_nm, state.mode, state.step, params.classification,
-        )  # fmt: skip
-        along = state.classification.torque_smooth_nm
-        state.mode = react(state.reaction, state.mode, shown, along, state.isolation.lever_max, state.step.dt, params.reaction)
+        _classify(state, params, torque)
     c.output.link = state.isolation.link if state.mode != FREE and state.isolation.link != 0 else link
+
+
+@inlined
+def _classify(state: Record, params: Record, torque: Vector) -> None:
+    """Classify the contact, and choose the mode."""
+    isolation, work, doubt_nm = state.isolation, state.contact_work, 0.0
+    for i in range(torque.shape[0]):
+        doubt_nm += abs(isolation.direction[i]) * state.detection.model_uncertainty[i]
+    shown = classify(
+        state.classification, isolation, torque, is_active(work), work.taken_j, doubt_nm, state.mode, state.step,
+        params.classification,
+    )  # fmt: skip
+    if shown == OBSTACLE:
+        take_for_passive(work, _stored(state, params.classification.obstacle_stiffness_min))
+    along = state.classification.torque_smooth_nm
+    limit = reject_limit(along, isolation, params.reaction)
+    state.mode = react(state.reaction, state.mode, shown, along, limit, state.step.dt, params.reaction)
 
 
 @inlined
 def _follow_work(state: Record, softest: float) -> None:
     """Follow the work of whatever acts on the arm, also before it is found to be a contact."""
-    stored = 0.0
-    if state.mode != FREE:
-        stored = stored_at_most(state.classification.torque_smooth_nm, state.isolation.lever, softest)
+    stored = _stored(state, softest) if state.mode != FREE else 0.0
     touch, velocity = state.touch, state.classification.velocity
     follow_work(
         state.contact_work, touch.torque, touch.sigma, state.detection.model_uncertainty, velocity, state.mode != FREE,
         stored, state.step.dt,
     )  # fmt: skip
+
+
+@inlined
+def _stored(state: Record, softest: float) -> float:
+    """Return what an obstacle may hold back at the contact's present torque, J."""
+    return stored_at_most(state.classification.torque_smooth_nm, state.isolation.lever, softest)
 
 
 @compiled
