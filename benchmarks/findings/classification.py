@@ -21,7 +21,7 @@ from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 
 def push_or_obstacle() -> None:
-    """The sign of the work misses many that push a moving arm; yielding a little to see whether it eases does not."""
+    """The bare sign of the work is wrong where an arm moves; with its errors, and what yielding brings, it is not."""
     scenes = Scenes(48)
     real = [motion.world(met, True) for motion, met in zip(scenes.motions, scenes.obstacles, strict=True)]
     found: dict[str, list[list[int]]] = {}
@@ -34,7 +34,7 @@ def push_or_obstacle() -> None:
     for name, rows in found.items():
         fast, safe = (np.array([row[1:] for row in rows if row[0] == which]).sum(axis=0) for which in (False, True))
         by_work = f"{fast[1]} of {fast[0]} (no bound), {safe[1]} of {safe[0]} (safe)"
-        say(f"{name:24s} taken for a push by its work: {by_work}; by yielding: {safe[2]} of {safe[0]}")
+        say(f"{name:24s} taken for a push by its work: {by_work}; by the controller: {safe[2]} of {safe[0]}")
 
 
 def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarray]:

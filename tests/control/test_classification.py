@@ -1,41 +1,44 @@
-"""What goes on after the arm has receded is a push, what falls as a spring would is an obstacle."""
+"""What takes less than a spring would, or goes on after the arm has receded, is a push; what is stiff an obstacle."""
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contactsafe.control.classification import is_push
+from contactsafe.control.classification import goes_on, is_stiff
 
 SOFTEST = 1500.0
 
 levers = st.floats(0.03, 1.0)
 displacements = st.floats(1e-4, 0.1)
+torques = st.floats(2.0, 40.0)
+
+
+@given(torque=torques, stiffness=st.floats(10.0, 1e5), receded=st.floats(0.0, 1.0))
+def test_no_spring_that_took_its_energy_from_the_arm_is_a_push(torque, stiffness, receded):
+    """A spring of κ N m/rad took τ² / (2 κ); receding by x it loses κ x, all of it at most."""
+    displacement = receded * torque / stiffness
+    taken = 0.5 * torque * torque / stiffness
+    assert not goes_on(stiffness * displacement, displacement, torque, taken, 0.0)
+    assert not goes_on(torque, displacement + 1.0, torque, taken, 0.0)
+
+
+@given(torque=torques, taken=st.floats(0.0, 0.05), rise=st.floats(0.0, 20.0))
+def test_a_torque_that_goes_on_is_a_push_once_the_fall_of_a_spring_would_stand_out(torque, taken, rise):
+    displacement = 4.0 * max(taken, 0.0005) / torque
+    assert goes_on(-rise, displacement, torque, taken, 0.0)
+
+
+@given(torque=torques, taken=st.floats(0.0, 0.05), displacement=displacements)
+def test_what_the_models_errors_may_feign_is_no_push(torque, taken, displacement):
+    assert not goes_on(0.0, displacement, torque, taken, torque)
 
 
 @given(stiffness=st.floats(SOFTEST, 1e6), lever=levers, displacement=displacements)
-def test_no_spring_as_stiff_as_the_softest_obstacle_is_a_push(stiffness, lever, displacement):
+def test_the_softest_obstacle_is_stiff_once_its_fall_stands_out(stiffness, lever, displacement):
     """At a lever arm l a spring of k N/m loses k l² N m for every radian that the arm recedes."""
-    assert not is_push(stiffness * lever**2 * displacement, displacement, lever, SOFTEST)
+    fall = stiffness * lever**2 * displacement
+    assert is_stiff(fall, displacement, SOFTEST * lever**2, 0.0) == (fall > 0.4)
 
 
-@given(lever=levers, displacement=displacements, wrong=st.floats(0.71, 1.40))
-def test_a_lever_found_wrong_by_a_factor_of_root_two_does_not_matter(lever, displacement, wrong):
-    """The softest obstacle is one still, and a force that does not slacken a push."""
-    assert not is_push(SOFTEST * (lever / wrong) ** 2 * displacement * 1.01, displacement, lever, SOFTEST)
-    assert is_push(0.0, displacement, lever * wrong, SOFTEST)
-
-
-@given(lever=levers, displacement=displacements, rise=st.floats(0.0, 20.0))
-def test_what_goes_on_or_rises_is_a_push(lever, displacement, rise):
-    assert is_push(-rise, displacement, lever, SOFTEST)
-
-
-@given(lever=levers, displacement=displacements)
-def test_line_is_drawn_at_half_the_fall_of_the_softest_obstacle(lever, displacement):
-    line = 0.5 * SOFTEST * lever**2 * displacement
-    assert is_push(line * (1 - 1e-9), displacement, lever, SOFTEST)
-    assert not is_push(line * (1 + 1e-9), displacement, lever, SOFTEST)
-
-
-@given(lever=levers, drop=st.floats(0.0, 5.0))
-def test_nothing_is_a_push_before_the_arm_gave_way(lever, drop):
-    assert not is_push(drop, 0.0, lever, SOFTEST)
+@given(lever=levers, displacement=displacements, change=st.floats(-20.0, 0.0))
+def test_what_does_not_fall_is_not_stiff(lever, displacement, change):
+    assert not is_stiff(change, displacement, SOFTEST * lever**2, 0.0)

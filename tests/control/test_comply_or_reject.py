@@ -119,25 +119,19 @@ def test_lasting_push_is_held_against(panda, body, force):
     assert away[-1] < 0.004
 
 
-def test_bound_in_mode_reject_is_a_multiple_of_the_torque_of_a_push_and_falls_ever_more_slowly(panda):
-    """`reject_margin` times it; tried again after `reject_decay_s`, then twice, four times as long."""
+def test_bound_in_mode_reject_falls_ever_more_slowly_and_never_below_the_push_for_long(panda):
+    """Tried again after `reject_decay_s`, then twice as long: the arm recedes a little, and the push goes on."""
     plant, controller = Plant(panda), controller_at(panda, SAFE)
     plant.push("link5", (0.0, 25.0, 0.0))
-    still = hold(panda)
-    state, times, held = controller.record["state"], [], []
-    for k in range(4000):
+    still, state = hold(panda), controller.record["state"]
+    times, bounds = [], []
+    for _ in range(8000):
         plant.run(controller, still, 1, UNTOUCHED)
-        if state["mode"] == REJECT and (not times or state["reaction"]["reject_decay_s"] > times[-1][1]):
-            times.append((k, float(state["reaction"]["reject_decay_s"])))
-            held.append(
-                float(state["reaction"]["reject_limit_nm"]) / float(state["classification"]["torque_smooth_nm"])
-            )
-    assert [decay_s for _, decay_s in times[:3]] == [
-        SAFE.reaction.reject_decay_s,
-        2 * SAFE.reaction.reject_decay_s,
-        4 * SAFE.reaction.reject_decay_s,
-    ]
-    assert held == pytest.approx([SAFE.reaction.reject_margin] * len(held), rel=0.01)
+        if state["mode"] == REJECT and (not times or state["reaction"]["reject_decay_s"] > times[-1]):
+            times.append(float(state["reaction"]["reject_decay_s"]))
+        bounds.append(state["reaction"]["reject_limit_nm"] - 0.8 * state["classification"]["torque_smooth_nm"])
+    assert times[:2] == [SAFE.reaction.reject_decay_s, 2 * SAFE.reaction.reject_decay_s]
+    assert min(bounds[1000:]) > 0.0
 
 
 @pytest.mark.parametrize("stiffness", [2000.0, 20000.0])

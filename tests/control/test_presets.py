@@ -33,7 +33,6 @@ def test_paper_has_every_printed_parameter_and_nothing_beyond_it():
         "contact_torque_limit_comply_nm",
         "contact_torque_limit_reject_nm",
         "contact_force_limit_comply_n",
-        "contact_force_limit_reject_n",
         "tool_force_limit_n",
         "tank_j",
     ):
@@ -108,11 +107,6 @@ def test_unknown_preset():
         ({"release_fraction": 0.0}, "release_fraction = 0.0 is no fraction; give more than 0 and at most 1"),
         ({"torque_rate_fraction": 5.0}, "torque_rate_fraction = 5.0 is no fraction; give more than 0 and at most 1"),
         ({"joint_speed_fraction": 1.1}, "joint_speed_fraction = 1.1 is no fraction; give more than 0 and at most 1"),
-        (
-            {"contact_force_limit_comply_n": 5.0, "contact_force_limit_reject_n": 4.0},
-            "contact_force_limit_reject_n = 4.0 is below contact_force_limit_comply_n = 5.0; the bound of mode "
-            "REJECT may be the higher one, never the lower",
-        ),
         ({"stiffness_range": (20.0, 10.0)}, "stiffness_range = (20.0, 10.0) is empty; give (lowest, highest)"),
         ({"damping_range": (5.0, 5.0)}, "damping_range = (5.0, 5.0) is empty; give (lowest, highest)"),
         (

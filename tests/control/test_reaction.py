@@ -11,7 +11,7 @@ from tests.control.contact_scene import scene
 
 from contactsafe import presets
 from contactsafe.control.codes import COMPLY, NO_CONTACT, OBSTACLE, PUSH, REJECT
-from contactsafe.control.contact_bound import contact_limit
+from contactsafe.control.contact_bound import contact_limit, reject_limit
 from contactsafe.control.isolation import isolation_dtype
 from contactsafe.control.params import fill_params, params_dtype
 from contactsafe.control.reaction import begin_reaction, damp_approach, react, reaction_dtype
@@ -47,23 +47,30 @@ def test_damping_of_the_approach_takes_energy_out_and_leaves_what_recedes(seed, 
 
 def test_an_obstacle_is_complied_with_and_a_push_rejected(params):
     reaction = begun()
-    assert react(reaction, COMPLY, NO_CONTACT, 5.0, 0.001, params) == COMPLY
-    assert react(reaction, COMPLY, PUSH, 5.0, 0.001, params) == REJECT
-    assert react(reaction, REJECT, NO_CONTACT, 5.0, 0.001, params) == REJECT
-    assert react(reaction, REJECT, OBSTACLE, 5.0, 0.001, params) == COMPLY
+    assert react(reaction, COMPLY, NO_CONTACT, 5.0, 10.0, 0.001, params) == COMPLY
+    assert react(reaction, COMPLY, PUSH, 5.0, 10.0, 0.001, params) == REJECT
+    assert react(reaction, REJECT, NO_CONTACT, 5.0, 10.0, 0.001, params) == REJECT
+    assert react(reaction, REJECT, OBSTACLE, 5.0, 10.0, 0.001, params) == COMPLY
 
 
 def test_bound_of_reject_falls_and_each_confirmed_push_doubles_its_time(params):
     reaction = begun()
-    mode = react(reaction, COMPLY, PUSH, 5.0, 0.001, params)
+    mode = react(reaction, COMPLY, PUSH, 5.0, 10.0, 0.001, params)
     first = float(reaction["reject_decay_s"])
     for _ in range(5000):
         before = float(reaction["reject_limit_nm"])
-        mode = react(reaction, mode, NO_CONTACT, 5.0, 0.001, params)
+        mode = react(reaction, mode, NO_CONTACT, 5.0, 10.0, 0.001, params)
         assert reaction["reject_limit_nm"] < before
-    react(reaction, mode, PUSH, 5.0, 0.001, params)
+    react(reaction, mode, PUSH, 5.0, 10.0, 0.001, params)
     assert reaction["reject_decay_s"] == 2.0 * first
-    assert_allclose(reaction["reject_limit_nm"], params["reject_margin"] * 5.0, rtol=0.01)
+    assert_allclose(reaction["reject_limit_nm"], 10.0, rtol=0.01)
+
+
+def test_a_push_is_resisted_with_a_force_at_the_longest_lever_and_never_less_than_a_multiple_of_its_torque(params):
+    isolation = np.zeros(1, dtype=isolation_dtype(7))[0]
+    isolation["lever"], isolation["lever_max"] = 0.03, 0.4
+    assert_allclose(reject_limit(1.0, isolation, params), 0.4 * params["reject_force_n"])
+    assert_allclose(reject_limit(50.0, isolation, params), params["reject_margin"] * 50.0)
 
 
 def test_bound_of_an_obstacle_falls_from_the_initial_one_to_that_of_comply(params):
@@ -71,7 +78,7 @@ def test_bound_of_an_obstacle_falls_from_the_initial_one_to_that_of_comply(param
     isolation["lever"] = isolation["lever_max"] = 0.4
     bounds = []
     for _ in range(3000):
-        react(reaction, COMPLY, NO_CONTACT, 5.0, 0.001, params)
+        react(reaction, COMPLY, NO_CONTACT, 5.0, 10.0, 0.001, params)
         bounds.append(contact_limit(reaction, isolation, params))
     assert_allclose(bounds[0], 0.4 * params["contact_force_limit_initial_n"], rtol=0.01)
     assert (np.diff(bounds) <= 0.0).all()

@@ -62,8 +62,15 @@ def begin_classification(classification: Record) -> None:
 
 @inlined
 def classify(
-    classification: Record, isolation: Record, torque: Vector, active: bool, taken_j: float, doubt_nm: float, mode: int,
-    step: Record, params: Record,
+    classification: Record,
+    isolation: Record,
+    torque: Vector,
+    active: bool,
+    taken_j: float,
+    doubt_nm: float,
+    mode: int,
+    step: Record,
+    params: Record,
 ) -> int:
     """Return what the contact has shown itself to be in this tick: OBSTACLE, PUSH, or NO_CONTACT for nothing new.
 
@@ -78,26 +85,40 @@ def classify(
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
-    displacement, probe = classification.displacement_smooth_rad, params.probe_m / isolation.lever_max
+    probe = params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
-    if displacement <= 0.0:
+    if classification.displacement_smooth_rad <= 0.0:
         _advance(classification, taken_j, probe)
-        rise = classification.torque_smooth_nm - classification.before_nm
-        pressed = mode == REJECT and rise > classification.before_nm and classification.advanced_rad > _CERTAIN * probe
-        if pressed and not active and is_stiff(rise, classification.advanced_rad, softest, doubt_nm):
+        if mode == REJECT and not active and _hinders(classification, probe, softest, doubt_nm):
             return OBSTACLE
-    if displacement > probe or active:
+    if classification.displacement_smooth_rad > probe or active:
         classification.advanced_rad, classification.before_nm = 0.0, classification.torque_smooth_nm
-    if displacement <= 0.0:
+    if classification.displacement_smooth_rad <= 0.0:
         return PUSH if active else NO_CONTACT
-    drop, torque_before = classification.reference_nm - classification.torque_smooth_nm, classification.reference_nm
-    if mode == COMPLY and displacement > probe and is_stiff(drop, displacement, softest, doubt_nm):
+    return _receded(classification, active, doubt_nm, mode, probe, softest)
+
+
+@inlined
+def _hinders(classification: Record, probe: float, softest: float, doubt_nm: float) -> bool:
+    """Tell whether the torque has doubled since the arm last receded, as an obstacle's does when it is pressed."""
+    rise, advanced = classification.torque_smooth_nm - classification.before_nm, classification.advanced_rad
+    far = advanced > _CERTAIN * probe and rise > classification.before_nm
+    return far and is_stiff(rise, advanced, softest, doubt_nm)
+
+
+@inlined
+def _receded(classification: Record, active: bool, doubt_nm: float, mode: int, probe: float, softest: float) -> int:
+    """Return what the contact shows itself to be as the arm recedes."""
+    displacement, before = classification.displacement_smooth_rad, classification.reference_nm
+    drop = before - classification.torque_smooth_nm
+    stiff = is_stiff(drop, displacement, softest, doubt_nm)
+    if mode == REJECT and displacement > _CERTAIN * probe and drop > _LOST * before:
+        return OBSTACLE if stiff else NO_CONTACT
+    if mode == COMPLY and displacement > probe and stiff:
         return OBSTACLE
-    if mode == REJECT and displacement > _CERTAIN * probe and drop > _LOST * torque_before:
-        return OBSTACLE if is_stiff(drop, displacement, softest, doubt_nm) else NO_CONTACT
     if displacement > classification.decision_rad:
         classification.decision_rad = displacement + probe
-        active = active or goes_on(drop, displacement, torque_before, classification.reference_j, doubt_nm)
+        active = active or goes_on(drop, displacement, before, classification.reference_j, doubt_nm)
     return PUSH if active else NO_CONTACT
 
 

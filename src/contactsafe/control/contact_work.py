@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from contactsafe.control.codes import COMPLY, FREE, REJECT
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 
@@ -37,39 +38,44 @@ def contact_work_dtype(n: int) -> np.dtype:
 
 @inlined
 def follow_work(
-    work: Record, torque: Vector, sigma: Vector, model: Vector, velocity: Vector, in_contact: bool, stored_j: float,
-    dt: float,
+    work: Record, touch: Record, model: Vector, velocity: Vector, mode: int, stored_j: float, dt: float
 ) -> None:
     """Add the work of one tick, and forget what no contact can still give back.
 
     Args:
         work: `contact_work_dtype` record; advanced.
-        torque: of the contact on the arm, (n,), N m.
-        sigma: its standard deviation, (n,), N m.
+        touch: `touch_dtype` record: torque of the contact on the arm, and its standard deviation.
         model: uncertainty of the arm's model in motion, (n,), N m.
         velocity: of the joints, in step with the torque, (n,), rad/s.
-        in_contact: whether something touches.
+        mode: FREE, COMPLY or REJECT.
         stored_j: most that a passive thing can hold back at this torque.
         dt: that passed, s.
     """
-    moved = 0.0
-    for i in range(torque.shape[0]):
-        work.done_j += dt * torque[i] * velocity[i]
-        work.moved_rad[i] += dt * velocity[i]
-        moved += velocity[i] * velocity[i]
+    speed, variance = 0.0, 0.0
+    for i in range(velocity.shape[0]):
+        work.done_j += dt * touch.torque[i] * velocity[i]
         work.doubt_j += dt * model[i] * abs(velocity[i])
-    nearest = min(max(work.done_j, -stored_j if in_contact else 0.0), 0.0)
-    if work.done_j != nearest:
-        keep = math.exp(-dt / _MEMORY_S - (0.0 if in_contact else dt * math.sqrt(moved) / _MEMORY_RAD))
-        work.doubt_j *= keep
-        work.done_j = nearest + keep * (work.done_j - nearest)
-        for i in range(torque.shape[0]):
-            work.moved_rad[i] *= keep
-    variance = 0.0
-    for i in range(torque.shape[0]):
-        variance += (sigma[i] * work.moved_rad[i]) ** 2
-    work.done_j = min(work.done_j, _CREDIT_J + work.doubt_j)
+        work.moved_rad[i] += dt * velocity[i]
+        speed += velocity[i] * velocity[i]
+    if mode == REJECT:  # one who pushes takes back what it gave as the arm comes back, and pushes on
+        work.done_j = max(work.done_j, -_CREDIT_J)
+    _forget(work, stored_j if mode == COMPLY else 0.0, dt / _MEMORY_S, dt * math.sqrt(speed) if mode == FREE else 0.0)
+    for i in range(velocity.shape[0]):
+        variance += (touch.sigma[i] * work.moved_rad[i]) ** 2
     work.taken_j = _SIGMAS * math.sqrt(variance) + work.doubt_j - work.done_j
+
+
+@compiled
+def _forget(work: Record, stored_j: float, time: float, moved: float) -> None:
+    """Let the work go back to the nearest that a passive contact may still hold; `time` is a part of the memory's."""
+    nearest = min(max(work.done_j, -stored_j), 0.0)
+    if work.done_j == nearest:
+        return
+    keep = math.exp(-time - moved / _MEMORY_RAD)
+    work.doubt_j *= keep
+    work.done_j = min(nearest + keep * (work.done_j - nearest), _CREDIT_J + work.doubt_j)
+    for i in range(work.moved_rad.shape[0]):
+        work.moved_rad[i] *= keep
 
 
 @compiled

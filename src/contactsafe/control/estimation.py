@@ -36,7 +36,6 @@ from contactsafe.core.linalg import dot, matmul, matvec_t_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.dynamics import update_dynamics
 
-
 _SIGMAS = 2.0
 """Standard deviations of the residual that the moment at the tool may be wrong by."""
 
@@ -125,7 +124,7 @@ def estimate(c: Record, J_bar: Matrix) -> None:
 
 @inlined
 def _is_beside_tool(state: Record, J_bar: Matrix, params: Record) -> bool:
-    """Tell whether what has changed since nothing touched passes the tool by: less margin than in motion is needed."""
+    """Tell whether the line of what has changed since nothing touched passes the tool by, with the least margin."""
     touch, sigma = state.touch, 0.0
     change = matvec_t_into(J_bar, touch.torque, stack_vector(6))
     for i in range(touch.sigma.shape[0]):

@@ -38,9 +38,7 @@ def begin_reaction(reaction: Record) -> None:
 
 
 @inlined
-def react(
-    reaction: Record, mode: int, shown: int, torque_nm: float, limit_nm: float, dt: float, params: Record
-) -> int:
+def react(reaction: Record, mode: int, shown: int, torque_nm: float, limit_nm: float, dt: float, params: Record) -> int:
     """Return the mode that what a contact has shown asks for, and let the bounds in force fall.
 
     Args:

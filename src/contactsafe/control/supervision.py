@@ -3,7 +3,7 @@
 from contactsafe.control.classification import begin_classification, classify, follow_velocity
 from contactsafe.control.codes import COMPLY, FREE, OBSTACLE
 from contactsafe.control.contact_bound import reject_limit
-from contactsafe.control.contact_work import follow_work, take_for_passive, is_active, stored_at_most
+from contactsafe.control.contact_work import follow_work, is_active, stored_at_most, take_for_passive
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
@@ -55,11 +55,8 @@ def _classify(state: Record, params: Record, torque: Vector) -> None:
 def _follow_work(state: Record, softest: float) -> None:
     """Follow the work of whatever acts on the arm, also before it is found to be a contact."""
     stored = _stored(state, softest) if state.mode != FREE else 0.0
-    touch, velocity = state.touch, state.classification.velocity
-    follow_work(
-        state.contact_work, touch.torque, touch.sigma, state.detection.model_uncertainty, velocity, state.mode != FREE,
-        stored, state.step.dt,
-    )  # fmt: skip
+    uncertainty, velocity = state.detection.model_uncertainty, state.classification.velocity
+    follow_work(state.contact_work, state.touch, uncertainty, velocity, state.mode, stored, state.step.dt)
 
 
 @inlined

@@ -38,8 +38,7 @@ def separate_tool_wrench(
     """Split the residual into the tool's part and the arm's, where no force sensor does.
 
     A wrench at the tool never shows in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force
-    whose line passes far from the tool, and what does work on the arm: no matter where somebody pushes, it is to be held.
-    Of the rest, the wrench that was there before the contact stays the tool's.
+    whose line passes far from the tool. Of the rest, the wrench that was there before the contact stays the tool's.
 
     Args:
         tool: `tool_wrench_dtype` record; advanced.
@@ -48,7 +47,7 @@ def separate_tool_wrench(
         J: task Jacobian, (6, n).
         J_bar: its dynamically consistent inverse, (n, 6).
         memory_gain: of the tool's wrench in this tick; 0 while the arm is in contact.
-        pushed: whether the contact has given the arm more work than it took.
+        pushed: whether somebody pushes the arm beside the tool.
         params: of identification.
     """
     n = detection_residual.shape[0]
@@ -78,9 +77,7 @@ def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Rec
 
 
 @inlined
-def follow_tool_force(
-    tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float
-) -> None:
+def follow_tool_force(tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
 
     While something touches the arm, that is the force of before.
