@@ -40,7 +40,7 @@ def test_a_spring_that_the_arm_ran_into_never_counts_as_one_who_pushes(stiffness
     for k in range(2000):
         velocity = speed if k < pressed else -back * speed if depth > 0.0 else 0.0
         torque = np.array([-stiffness * max(depth + 0.5 * DT * velocity, 0.0), 0.0])  # over the tick
-        stored = 0.5 * stiffness * depth * depth
+        stored = 0.5 * stiffness * max(depth + DT * velocity, 0.0) ** 2
         active |= follow(works, torque, MODEL, np.array([velocity, 0.0]), COMPLY if depth > 0.0 else FREE, stored)
         depth = max(depth + DT * velocity, 0.0)
     assert not active

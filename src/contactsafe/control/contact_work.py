@@ -1,7 +1,7 @@
 """Work: what a contact has done on the arm. A passive thing gives back no more than it took; who pushes does.
 
 An arm that runs into something does work on it, an arm that is pushed has work done on it, so the sign of the work
-tells a push from an obstacle without waiting for the arm to give way: the passivity of the environment (Hogan 1985).
+tells a push from an obstacle before the arm has given in: the passivity of the environment (Hogan 1985).
 """
 
 import math
