@@ -47,9 +47,8 @@ def follow_work(
         touch: `touch_dtype` record: torque of the contact on the arm, and its standard deviation.
         model: uncertainty of the arm's model in motion, (n,), N m.
         velocity: of the joints, in step with the torque, (n,), rad/s.
-        mode: FREE, COMPLY or REJECT.
+        mode, dt: in force, and the time that passed, s.
         stored_j: most that a passive thing can hold back at this torque.
-        dt: that passed, s.
     """
     speed, variance = 0.0, 0.0
     for i in range(velocity.shape[0]):
