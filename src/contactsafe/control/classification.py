@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from contactsafe.control.codes import COMPLY, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
+from contactsafe.control.contact_work import is_active
 from contactsafe.control.laws import observer_step
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled, inlined
@@ -64,9 +65,8 @@ def begin_classification(classification: Record) -> None:
 def classify(
     classification: Record,
     isolation: Record,
+    work: Record,
     torque: Vector,
-    active: bool,
-    taken_j: float,
     doubt_nm: float,
     mode: int,
     step: Record,
@@ -77,18 +77,17 @@ def classify(
     Args:
         classification: `classification_dtype` record; advanced.
         isolation: up to date; the longest lever arm is probed with, a short guess would let the arm be carried away.
+        work: `contact_work_dtype` record, up to date.
         torque: of the contact on the arm, (n,), N m.
-        active: whether the contact has given the arm more work than it took.
-        taken_j: work that it has taken at most, J.
         doubt_nm: by which the model's errors may have changed the contact's torque, N m.
         mode, step: in force.
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
-    probe = params.probe_m / isolation.lever_max
+    active, probe = is_active(work), params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
     if classification.displacement_smooth_rad <= 0.0:
-        _advance(classification, taken_j, probe)
+        _advance(classification, work.taken_j, probe)
         if mode == REJECT and not active and _hinders(classification, probe, softest, doubt_nm):
             return OBSTACLE
     if classification.displacement_smooth_rad > probe or active:

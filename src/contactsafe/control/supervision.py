@@ -3,7 +3,7 @@
 from contactsafe.control.classification import begin_classification, classify, follow_velocity
 from contactsafe.control.codes import COMPLY, FREE, OBSTACLE
 from contactsafe.control.contact_bound import reject_limit
-from contactsafe.control.contact_work import follow_work, is_active, stored_at_most, take_for_passive
+from contactsafe.control.contact_work import follow_work, stored_at_most, take_for_passive
 from contactsafe.control.detection import detect
 from contactsafe.control.isolation import forget_contact, isolate
 from contactsafe.control.reaction import begin_reaction, react
@@ -41,9 +41,8 @@ def _classify(state: Record, params: Record, torque: Vector) -> None:
     for i in range(torque.shape[0]):
         doubt_nm += abs(isolation.direction[i]) * state.detection.model_uncertainty[i]
     shown = classify(
-        state.classification, isolation, torque, is_active(work), work.taken_j, doubt_nm, state.mode, state.step,
-        params.classification,
-    )  # fmt: skip
+        state.classification, isolation, work, torque, doubt_nm, state.mode, state.step, params.classification
+    )
     if shown == OBSTACLE:
         take_for_passive(work, _stored(state, params.classification.obstacle_stiffness_min))
     along = state.classification.torque_smooth_nm
