@@ -1,7 +1,7 @@
 """Classification: whether a contact is an obstacle, a push on the arm, or the tool's own.
 
-An obstacle and a push look alike to the residual. They differ in what receding brings: the torque of an obstacle
-falls, that of a push goes on. `docs/concepts/control.md` has the states.
+An obstacle and a push look alike to the residual. They differ in who does work on whom, see `contact_work`, and in what
+receding brings: the torque of an obstacle falls, that of a push goes on. `docs/concepts/control.md` has the states.
 """
 
 import math

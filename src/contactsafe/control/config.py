@@ -94,12 +94,16 @@ class IdentificationConfig(Stage):
 class ClassificationConfig(Stage):
     """What tells a push from an obstacle, and a contact of the tool from none."""
 
-    probe_m: float = parameter(0.002, "m", "displacement by which the arm recedes before a contact is classified")
+    probe_m: float = parameter(
+        0.002, "m", "displacement by which the arm recedes before a contact is classified, unless its work tells first"
+    )
     probe_s: float = parameter(
         0.01, "s", "time constant with which torque, displacement and the force at the tool are smoothed for that"
     )
     obstacle_stiffness_min: float = parameter(
-        1500.0, "N/m", "of the softest thing that counts as an obstacle; what is softer counts as a push"
+        1500.0,
+        "N/m",
+        "of the softest thing that counts as an obstacle; the line is drawn at half of it",
     )
     tool_contact_n: float = parameter(3.0, "N", "least force at the tool that counts as its contact", positive=True)
 

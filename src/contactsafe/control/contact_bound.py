@@ -1,7 +1,7 @@
 """Bound on the commanded contact force: how large it is, and what is lowered to keep to it.
 
-Lowered are the compensation first, then the task as a whole, and last what is left, so also the damping: elastic part
-and compensation are bounded each for itself, and damping may press as well.
+Lowered are the compensation first, then, on an obstacle, the task as a whole, and last what is left, so also the
+damping: elastic part and compensation are bounded each for itself, and damping may press as well.
 """
 
 import math

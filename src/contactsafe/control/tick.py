@@ -133,7 +133,7 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
 def _contact_law(
     c: Record, elastic: Vector, damping: Vector, compensation: Vector, N_removed: Matrix, scale: float, reason: int
 ) -> Vector:
-    """Bound the commanded contact force: by compensation, task scale and, last, damping; then damp the approach.
+    """Bound the commanded contact force: compensation, on an obstacle the task, last the rest; then damp the approach.
 
     Args:
         c: `controller_dtype` record.
