@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from contactsafe import robots
-from contactsafe.control import evidence, localisation
+from contactsafe.control import evidence, localisation, wrench_information
 from contactsafe.control.evidence import Uncertainty
 from contactsafe.control.localisation import localisation_dtype
 from contactsafe.core.compiled import compiled
@@ -19,20 +19,26 @@ NORMAL_N, ACROSS_N = 30.0, 10.0
 
 @compiled
 def _localise(places, handles, torque, sigma, q, prior, times):
-    localisation.forget_place(places[0], q)
+    localisation.forget_place(places[0])
     for _ in range(times):
         variance = evidence.moment_variance(torque)
-        localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, prior, 1.0)
+        localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, prior, 1.0)
 
 
 @compiled
-def _evidence(handles, index, torque, sigma, variance, point, force):
-    return evidence.force_into(handles[0], index, torque, Uncertainty(sigma, variance), point, force)
+def _evidence(handles, told, index, torque, sigma, variance, point, force):
+    n = torque.shape[0]
+    wrench_information.inform(told[0], handles[0], torque, sigma)
+    link = min(evidence.link_of(handles[0], index, n), n) - 1
+    constant = wrench_information.marginalise_moment(told[0].G[link], told[0].h[link], variance)
+    return constant + evidence.force_into(handles[0], told[0], index, n, point, force)
 
 
 @compiled
 def _point(handles, index, n, point, normal):
-    return evidence.point_into(handles[0], index, n, point, normal)
+    link = evidence.place_into(handles[0], index, n, point, normal)
+    evidence.to_world(handles[0], min(link, n), point, normal)
+    return link
 
 
 class Bench:
@@ -65,7 +71,8 @@ class Bench:
 
     def evidence(self, index, torque, sigma, variance):
         point, force = np.zeros(3), np.zeros(3)
-        return _evidence(self.handles, index, torque, sigma, variance, point, force), force
+        told = np.zeros(1, wrench_information.information_dtype(self.arm.n))
+        return _evidence(self.handles, told, index, torque, sigma, variance, point, force), force
 
     def localised(self, torque, sigma, prior=0.02):
         places = np.zeros(1, localisation_dtype(self.arm.n))
@@ -178,31 +185,58 @@ def test_a_second_posture_makes_the_set_smaller_and_a_third_reading_of_the_same_
 
 @compiled
 def _forget(places, q):
-    localisation.forget_place(places[0], q)
+    localisation.forget_place(places[0])
 
 
 @compiled
 def _go_on(places, handles, torque, sigma, variance, q):
-    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.02, 1.0)
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, 0.02, 1.0)
 
 
-def test_what_a_posture_said_is_added_once_when_the_arm_has_left_it(panda):
-    """Evidence of N postures, the one of now among them, over the root of N."""
-    places, sigma = np.zeros(1, localisation_dtype(7)), np.full(7, 0.2)
-    postures = [panda.home + k * np.array([0.3, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0]) for k in range(3)]
-    torques = [np.array([2.0, 5.0, 1.0, -3.0, 0.2, 0.1, 0.0]), np.array([1.0, 4.0, 1.5, -3.0, 0.1, 0.0, 0.0])]
-    torques.append(np.array([3.0, 4.0, 1.0, -2.0, 0.0, 0.3, 0.0]))
-    _forget(places, postures[0])
-    said = []
-    for q, torque in zip(postures, torques, strict=True):
-        here = Bench(panda, q)
-        variance = evidence.moment_variance(torque)
+def test_postures_add_up_as_the_torques_of_one_force_that_turns_with_the_link(panda):
+    """Against the covariance of the torques of all postures together, written out for places of the tool."""
+    rng, sigma, tools = np.random.default_rng(5), np.full(7, 0.2), [482, 500, 520, 535]
+    places, rows = np.zeros(1, localisation_dtype(7)), {k: [] for k in tools}
+    _forget(places, panda.home)
+    force, torques = np.array([8.0, -6.0, 20.0]), []
+    for k in range(3):
+        here = Bench(panda, panda.home + k * np.array([0.3, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0]))
+        R = here.data.xmat[panda.model.jnt_bodyid[6]].reshape(3, 3)
+        for index in tools:
+            J_p, J_r = here.jacobian(index)
+            rows[index].append((R.T @ J_p, R.T @ J_r))
+        torques.append(rows[500][-1][0].T @ force + 0.1 * rng.standard_normal(7))
         for _ in range(3):  # read thrice, it says the same
-            _go_on(places, here.handles, torque, sigma, variance, q)
-        said.append(np.array([here.evidence(k, torque, sigma, variance)[0] for k in range(0, 480, 20)]))
-    together = sum(one - one[0] for one in said) / np.sqrt(3.0)
-    log = places["log"][0, 0:480:20]
-    assert_allclose(log - log[0], together, rtol=1e-6, atol=1e-6)
+            _go_on(places, here.handles, torques[-1], sigma, 0.3**2, here.q)
+    expected = []
+    for index in tools:
+        J_p, J_r = (np.hstack([row[part] for row in rows[index]]) for part in (0, 1))
+        covariance = np.diag(np.tile(sigma**2, 3)) + NORMAL_N**2 * J_p.T @ J_p + 0.3**2 * J_r.T @ J_r
+        expected.append(log_of_gaussian(np.hstack(torques), covariance))
+    log = places["log"][0, tools]
+    assert_allclose(log - log[0], np.array(expected) - expected[0], rtol=1e-6, atol=1e-6)
+
+
+def test_what_was_told_of_another_force_is_forgotten(panda):
+    """An arm that is touched elsewhere while it moves is not held to what its torques told before."""
+    places, sigma = np.zeros(1, localisation_dtype(7)), np.full(7, 0.1)
+    here = Bench(panda, panda.home)
+    on_4, on_6 = (next(k for k in range(480) if here.point(k)[0] == link) for link in (4, 6))
+    _forget(places, panda.home)
+    _go_on(places, here.handles, here.torque(on_4, -25.0 * here.point(on_4)[2]), sigma, 0.3**2, here.q)
+    there = Bench(panda, panda.home + np.array([0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))
+    torque = there.torque(on_6, -25.0 * there.point(on_6)[2])
+    _elsewhere(places, there.handles, torque, sigma, there.q)
+    assert places["differs"][0]
+    _elsewhere(places, there.handles, torque, sigma, there.q)
+    assert not places["differs"][0]
+    assert np.linalg.norm(places["point"][0] - there.point(on_6)[1]) < 0.06
+
+
+@compiled
+def _elsewhere(places, handles, torque, sigma, q):
+    variance = evidence.moment_variance(torque)
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.5, 0.02, 1.0)
 
 
 def test_a_sweep_compares_all_points_by_the_same_torque(panda):
@@ -219,4 +253,4 @@ def test_a_sweep_compares_all_points_by_the_same_torque(panda):
 @compiled
 def _part(places, handles, torque, sigma, q):
     variance = evidence.moment_variance(torque)
-    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.02, 0.001)
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, 0.02, 0.001)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import dot, spd_inverse
+from contactsafe.core.linalg import dot
 from contactsafe.core.native import view1, view2
 from contactsafe.core.stack import stack_matrix, stack_vector
 from contactsafe.robot.surface import SURFACE_COLUMNS
@@ -52,20 +52,48 @@ def moment_variance(torque: Vector) -> float:
 
 
 @compiled
-def point_into(handle: Record, index: int, n: int, point: Vector, normal: Vector) -> int:
-    """Fill a point of the surface and its outward normal, world, (3,), m; return its link, n + 1 for the tool."""
+def place_into(handle: Record, index: int, n: int, point: Vector, normal: Vector) -> int:
+    """Fill a place and its outward normal in the frame of its link, the last one for the tool, (3,), m.
+
+    Returns:
+        The link, n + 1 for the tool.
+    """
     row = view2(handle.places, handle.place_points, SURFACE_COLUMNS)[index]
-    if index >= handle.place_points - handle.tool_places:
-        link, site = n + 1, handle.site
-        R, origin = view2(handle.site_xmat, site + 1, 9)[site], view2(handle.site_xpos, site + 1, 3)[site]
-    else:
-        link = int(row[0])
-        body = handle.first_body + link - 1
-        R, origin = view2(handle.xmat, handle.nbody, 9)[body], view2(handle.xpos, handle.nbody, 3)[body]
+    if index < handle.place_points - handle.tool_places:
+        point[:], normal[:] = row[1:4], row[4:7]
+        return int(row[0])
+    R, origin = view2(handle.site_xmat, handle.site + 1, 9)[handle.site], _site(handle)
+    p, m, at, body = stack_vector(3), stack_vector(3), _frame(handle, n)[1], _frame(handle, n)[0]
     for k in range(3):
-        point[k] = origin[k] + R[3 * k] * row[1] + R[3 * k + 1] * row[2] + R[3 * k + 2] * row[3]
-        normal[k] = R[3 * k] * row[4] + R[3 * k + 1] * row[5] + R[3 * k + 2] * row[6]
-    return link
+        p[k] = origin[k] - at[k] + R[3 * k] * row[1] + R[3 * k + 1] * row[2] + R[3 * k + 2] * row[3]
+        m[k] = R[3 * k] * row[4] + R[3 * k + 1] * row[5] + R[3 * k + 2] * row[6]
+    for k in range(3):
+        point[k] = body[k] * p[0] + body[3 + k] * p[1] + body[6 + k] * p[2]
+        normal[k] = body[k] * m[0] + body[3 + k] * m[1] + body[6 + k] * m[2]
+    return n + 1
+
+
+@inlined
+def _site(handle: Record) -> Vector:
+    return view2(handle.site_xpos, handle.site + 1, 3)[handle.site]
+
+
+@inlined
+def _frame(handle: Record, link: int) -> tuple[Vector, Vector]:
+    """Return rotation (9,) and origin (3,) of a link, world."""
+    body = handle.first_body + link - 1
+    return view2(handle.xmat, handle.nbody, 9)[body], view2(handle.xpos, handle.nbody, 3)[body]
+
+
+@compiled
+def to_world(handle: Record, link: int, point: Vector, vector: Vector) -> None:
+    """Turn a point and a vector in a link's frame, (3,), into those of the world, in place."""
+    R, origin = _frame(handle, link)
+    p, v = stack_vector(3), stack_vector(3)
+    p[:], v[:] = point, vector
+    for k in range(3):
+        point[k] = origin[k] + R[3 * k] * p[0] + R[3 * k + 1] * p[1] + R[3 * k + 2] * p[2]
+        vector[k] = R[3 * k] * v[0] + R[3 * k + 1] * v[1] + R[3 * k + 2] * v[2]
 
 
 @inlined
@@ -74,62 +102,6 @@ def link_of(handle: Record, index: int, n: int) -> int:
     if index >= handle.place_points - handle.tool_places:
         return n + 1
     return int(view1(handle.places, SURFACE_COLUMNS * (index + 1))[SURFACE_COLUMNS * index])
-
-
-@compiled
-def _information(handle: Record, torque: Vector, known: Uncertainty, joints: int, G: Matrix, h: Vector) -> float:
-    """Fill what a torque tells of a wrench about the origin on a link, G (6, 6) and h (6,); return a constant of it.
-
-    A joint with axis a through o feels w · (f, m), w = (o × a, a): G = Σ w wᵀ / σ², h = Σ w τ / σ².
-    """
-    n = torque.shape[0]
-    xanchor, xaxis, w = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3), stack_vector(6)
-    G[:], h[:] = 0.0, 0.0
-    for i in range(joints):
-        o, a, weight = xanchor[i], xaxis[i], 1.0 / (known.sigma[i] * known.sigma[i])
-        w[0], w[1], w[2] = o[1] * a[2] - o[2] * a[1], o[2] * a[0] - o[0] * a[2], o[0] * a[1] - o[1] * a[0]
-        w[3], w[4], w[5] = a[0], a[1], a[2]
-        for j in range(6):
-            h[j] += weight * torque[i] * w[j]
-            for k in range(6):
-                G[j, k] += weight * w[j] * w[k]
-    return _marginalise_moment(G, h, known.moment_variance)
-
-
-@compiled
-def _marginalise_moment(G: Matrix, h: Vector, variance: float) -> float:
-    """Allow for a moment of this variance beside the force: G − G_m K G_mᵀ and h − G_m K h_m, K = (1/s² + G_mm)⁻¹.
-
-    Returns:
-        h_m · K h_m / 2 − log det(1 + s² G_mm) / 2.
-    """
-    S, K, of_moment, Kh = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(6, 3), stack_vector(3)
-    for j in range(3):
-        for k in range(3):
-            S[j, k] = variance * G[3 + j, 3 + k]
-        S[j, j] += 1.0
-    spd_inverse(S, K)
-    constant = -0.5 * math.log(_determinant(S))
-    for k in range(3):
-        Kh[k] = variance * (K[k, 0] * h[3] + K[k, 1] * h[4] + K[k, 2] * h[5])
-        constant += 0.5 * Kh[k] * h[3 + k]
-    of_moment[:] = G[:, 3:]
-    for j in range(6):
-        m = of_moment[j]
-        h[j] -= m[0] * Kh[0] + m[1] * Kh[1] + m[2] * Kh[2]
-        for k in range(6):
-            for x in range(3):
-                G[j, k] -= variance * of_moment[k, x] * (m[0] * K[0, x] + m[1] * K[1, x] + m[2] * K[2, x])
-    return constant
-
-
-@inlined
-def _determinant(S: Matrix) -> float:
-    return (
-        S[0, 0] * (S[1, 1] * S[2, 2] - S[1, 2] * S[2, 1])
-        - S[0, 1] * (S[1, 0] * S[2, 2] - S[1, 2] * S[2, 0])
-        + S[0, 2] * (S[1, 0] * S[2, 1] - S[1, 1] * S[2, 0])
-    )
 
 
 @inlined
@@ -176,51 +148,57 @@ def _solve(A: Matrix, b: Vector, normal: Vector, f: Vector) -> tuple[float, floa
 
 
 @compiled
-def compare_into(handle: Record, torque: Vector, known: Uncertainty, start: int, stop: int, log: Vector) -> None:
-    """Fill the evidence of part of the places, in the same place of `log`, up to a constant of all.
+def compare_into(handle: Record, told: Record, constant: Vector, start: int, stop: int, log: Vector) -> None:
+    """Fill the evidence of part of the places, in the same part of `log`, up to a constant of all.
 
     Args:
         handle: of the nominal model, up to date.
-        torque: external, (n,), N m.
-        known: how well.
+        told: of a wrench on each link, the moment beside the place taken out; `information_dtype` record.
+        constant: that `marginalise_moment` returned for each link, (n,).
         start, stop: places compared.
         log: (at least stop,).
     """
-    n = torque.shape[0]
-    G, h, A, b, f = stack_matrix(6, 6), stack_vector(6), stack_matrix(3, 3), stack_vector(3), stack_vector(3)
-    point, normal = stack_vector(3), stack_vector(3)
-    of_link, constant = -1, 0.0
+    n = constant.shape[0]
+    A, b, f, point, normal = stack_matrix(3, 3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     for index in range(start, stop):
-        link = point_into(handle, index, n, point, normal)
-        if min(link, n) != of_link:
-            of_link = min(link, n)
-            constant = _information(handle, torque, known, of_link, G, h)
-        log[index] = constant + _evidence(G, h, point, normal, link > n, A, b, f)
+        link = place_into(handle, index, n, point, normal)
+        k = min(link, n) - 1
+        log[index] = constant[k] + _evidence(told.G[k], told.h[k], point, normal, link > n, A, b, f)
 
 
 @compiled
-def force_into(handle: Record, index: int, torque: Vector, known: Uncertainty, point: Vector, force: Vector) -> float:
-    """Fill a point of the surface, world, (3,), m, and the likeliest force there, (3,), N; return its evidence."""
-    n = torque.shape[0]
-    G, h, A, b, normal = stack_matrix(6, 6), stack_vector(6), stack_matrix(3, 3), stack_vector(3), stack_vector(3)
-    link = point_into(handle, index, n, point, normal)
-    constant = _information(handle, torque, known, min(link, n), G, h)
-    return constant + _evidence(G, h, point, normal, link > n, A, b, force)
+def force_into(handle: Record, told: Record, index: int, n: int, point: Vector, force: Vector) -> float:
+    """Fill a place, world, (3,), m, and the likeliest force there, world, (3,), N; return its evidence.
+
+    Args:
+        handle: of the nominal model, up to date.
+        told: as in `compare_into`; up to the constant of the link.
+        index: of the place.
+        n: number of joints.
+    """
+    A, b, normal = stack_matrix(3, 3), stack_vector(3), stack_vector(3)
+    link = place_into(handle, index, n, point, normal)
+    k = min(link, n)
+    found = _evidence(told.G[k - 1], told.h[k - 1], point, normal, link > n, A, b, force)
+    to_world(handle, k, point, force)
+    return found
 
 
 @compiled
-def left_over(handle: Record, index: int, torque: Vector, known: Uncertainty, point: Vector, force: Vector) -> float:
-    """Return what of a torque the likeliest force at a place leaves over, Σ (τ − J_pᵀ f)² / (σ² + s²).
+def left_over(handle: Record, link: int, torque: Vector, known: Uncertainty, point: Vector, force: Vector) -> float:
+    """Return what a force on a link leaves over of a torque, Σ (τ − J_pᵀ f)² / (σ² + s²).
 
-    Where that is the place it is about n − 3 large. Point and force are filled as by `force_into`.
+    Args:
+        handle: of the nominal model, up to date.
+        link: 1 … n.
+        torque, known: external, (n,), N m, and how well it is known.
+        point, force: world, (3,) m and N.
     """
     n, squared = torque.shape[0], 0.0
-    force_into(handle, index, torque, known, point, force)
-    joints = min(link_of(handle, index, n), n)
     xanchor, xaxis = view2(handle.xanchor, n, 3), view2(handle.xaxis, n, 3)
     for i in range(n):
         o, a, left = xanchor[i], xaxis[i], torque[i]
-        if i < joints:
+        if i < link:
             x, y, z = point[0] - o[0], point[1] - o[1], point[2] - o[2]
             left -= a[0] * (y * force[2] - z * force[1])
             left -= a[1] * (z * force[0] - x * force[2]) + a[2] * (x * force[1] - y * force[0])

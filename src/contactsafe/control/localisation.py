@@ -1,8 +1,9 @@
 """Localisation: where on the arm or its tool something touches it, and with what force, as far as torques can tell.
 
 All places are compared by their `evidence`: a grid filter over the surface, in place of the particles of Manuelli &
-Tedrake 2016. Several may explain the torques of one posture alike; as the arm moves on, what the postures before said
-is remembered, and the set shrinks.
+Tedrake 2016. Several may explain the torques of one posture alike; as the arm moves on, what the postures before told
+is remembered, for one force in the frame of the touched link, and the set shrinks. Where one force does not explain
+the torques of now as well, it has changed: what was remembered is forgotten.
 """
 
 import math
@@ -17,8 +18,8 @@ from contactsafe.control.evidence import (
     left_over,
     link_of,
     most_by_noise,
-    point_into,
 )
+from contactsafe.control.wrench_information import inform, information_dtype, marginalise_moment
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_vector
@@ -42,6 +43,9 @@ _ABOUT_M, _NEGLIGIBLE = 0.05, 0.02
 _CHECK = 0.2
 """Of what a sweep leaves over that is taken over at once: contacts that come together look like several at first."""
 
+_AS_WELL = 0.05
+"""A baseline holds as well as before where its weight is less by no more than this."""
+
 _NEVER = -1e9
 
 
@@ -49,19 +53,24 @@ def localisation_dtype(n: int) -> np.dtype:
     """Describe what is known of a contact's place."""
     return np.dtype(
         [
-            ("now", _f, (MAX_PLACES,)),  # log of how well each point explains the torques of this sweep, so far
-            ("last", _f, (MAX_PLACES,)),  # the same of the last whole sweep
-            ("memory", _f, (MAX_PLACES,)),  # the same of postures that the arm has left, their sum
+            ("now", information_dtype(n)),  # what the torques of this sweep tell
+            ("here", information_dtype(n)),  # what was told about this posture, where the baseline holds best
+            ("before", information_dtype(n)),  # what was told in postures that the arm has left, their sum
+            ("all", information_dtype(n)),  # both, the moment of a contact beside a place of the grid taken out
+            ("constant", _f, (n,)),  # that came with that
             ("postures", _f),  # that are remembered
-            ("log", _f, (MAX_PLACES,)),  # of how probable each point was after the last whole sweep, up to a constant
-            ("next", _i),  # point to be compared next
-            ("torque", _f, (n,)),  # with which all points of a sweep are compared, N m
+            ("weight", _f),  # of the baseline where `here` was told
+            ("differs", _i),  # what is remembered contradicts the torques of now
+            ("compared", _f, (MAX_PLACES,)),  # log of how well each place explains `all`, so far
+            ("log", _f, (MAX_PLACES,)),  # of how probable each place was after the last whole sweep, up to a constant
+            ("next", _i),  # place to be compared next
+            ("torque", _f, (n,)),  # with which all places of a sweep are compared, N m
             ("sigma", _f, (n,)),  # its standard deviation, N m
             ("moment_variance", _f),  # see `Uncertainty`
             ("tool_prior", _f),  # probability of the tool beforehand
-            ("turn", _i),  # sweeps over all points since the contact began
-            ("q", _f, (n,)),  # posture that is to be added to the memory next, rad
-            ("best", _i),  # most probable point of the most probable link, −1 for none
+            ("turn", _i),  # sweeps over all places since the contact began
+            ("q", _f, (n,)),  # posture of `here`, rad
+            ("best", _i),  # most probable place on the most probable link, −1 for none
             ("link", _i),  # that link, n + 1 for the tool, 0 for none
             ("tool_probability", _f),  # of the tool
             ("left_over", _f),  # of the torque at the best point, over the most that noise leaves; smoothed
@@ -72,63 +81,76 @@ def localisation_dtype(n: int) -> np.dtype:
 
 
 @compiled
-def forget_place(place: Record, q: Vector) -> None:
+def forget_place(place: Record) -> None:
     """Begin with a contact that may be anywhere."""
-    place.memory[:], place.postures, place.next, place.turn, place.q[:] = 0.0, 0.0, 0, 0, q
+    place.next, place.turn, place.differs = 0, 0, 0
     place.best, place.link, place.tool_probability = -1, 0, 0.0
     place.force[:], place.point[:], place.left_over = 0.0, 0.0, 0.0
 
 
 @compiled
 def localise(
-    place: Record, handle: Record, torque: Vector, known: Uncertainty, q: Vector, tool_prior: float, dt: float
-) -> None:
-    """Compare the next points of the surface, all of them in the first tick of a contact.
+    place: Record, handle: Record, torque: Vector, known: Uncertainty, q: Vector, weight: float, tool_prior: float,
+    dt: float,
+) -> None:  # fmt: skip
+    """Compare the next places of the surface, all of them in the first tick of a contact.
 
     Args:
         place: `localisation_dtype` record; advanced.
         handle: of the nominal model, up to date.
         torque, known: external, (n,), N m, and how well it is known.
         q, dt: posture, (n,), rad, and the time that passed, s.
+        weight: of the baseline here, 0 … 1.
         tool_prior: probability of the tool before anything is known.
     """
     points = handle.place_points
     if place.next == 0:
         place.torque[:], place.sigma[:], place.moment_variance = torque, known.sigma, known.moment_variance
         place.tool_prior = tool_prior
+        inform(place.now, handle, torque, known.sigma)
+        _remember(place, q, weight)
+        _add_up(place)
     stop = points if place.turn == 0 else min(place.next + round(_POINTS_A_S * dt), points)
-    of_sweep = Uncertainty(place.sigma, place.moment_variance)
-    compare_into(handle, place.torque, of_sweep, place.next, stop, place.now)
+    compare_into(handle, place.all, place.constant, place.next, stop, place.compared)
     place.next = stop % points
     if place.next > 0:
         return
     place.turn += 1
-    _remember(place, q, points)
-    _conclude(place, handle, place.torque, of_sweep, points)
-    _check(place, handle, of_sweep)
+    _conclude(place, handle, torque.shape[0], points)
+    _check(place, handle, Uncertainty(place.sigma, place.moment_variance))
 
 
 @compiled
-def _remember(place: Record, q: Vector, points: int) -> None:
-    """Add what the torques said in a posture to the memory, once the arm has left it; keep what they say now."""
-    if place.turn == 1:
+def _remember(place: Record, q: Vector, weight: float) -> None:
+    """Keep what is told of a posture where the baseline holds best; add it to the memory once the arm has left."""
+    if place.turn == 0 or place.differs != 0:
+        place.before.G[:], place.before.h[:], place.postures, place.weight = 0.0, 0.0, 0.0, 0.0
         place.q[:] = q
     elif distance(q, place.q) > _MOVED_RAD:
+        keep = min(1.0, (_POSTURES - 1.0) / max(place.postures, 1.0))
+        place.before.G[:] = keep * place.before.G + place.here.G
+        place.before.h[:] = keep * place.before.h + place.here.h
+        place.postures, place.weight = keep * place.postures + 1.0, 0.0
         place.q[:] = q
-        keep, best = min(1.0, (_POSTURES - 1.0) / max(place.postures, 1.0)), place.last[:points].max()
-        place.postures = keep * place.postures + 1.0
-        for index in range(points):
-            place.memory[index] = keep * place.memory[index] + (place.last[index] - best)
-    place.last[:points] = place.now[:points]
+    if weight >= place.weight - _AS_WELL:
+        place.here.G[:], place.here.h[:], place.weight = place.now.G, place.now.h, weight
 
 
 @compiled
-def _conclude(place: Record, handle: Record, torque: Vector, known: Uncertainty, points: int) -> None:
-    """Find the most probable link, the most probable point of it, and the force there."""
-    n, total = torque.shape[0], 0.0
-    probability = stack_vector(n + 2)
+def _add_up(place: Record) -> None:
+    """Add up what all postures tell, and take the moment of a contact beside a place out."""
+    place.all.G[:] = place.before.G + place.here.G
+    place.all.h[:] = place.before.h + place.here.h
+    for k in range(place.constant.shape[0]):
+        place.constant[k] = marginalise_moment(place.all.G[k], place.all.h[k], place.moment_variance)
+
+
+@compiled
+def _conclude(place: Record, handle: Record, n: int, points: int) -> None:
+    """Find the most probable link, the most probable place on it, and the force there."""
+    total, probability = 0.0, stack_vector(n + 2)
     probability[:] = 0.0
-    best = _combine(place, handle, points)
+    best = _weigh(place, handle, points)
     for index in range(points):
         weight = math.exp(max(place.log[index] - best, -60.0))
         probability[link_of(handle, index, n)] += weight
@@ -142,51 +164,55 @@ def _conclude(place: Record, handle: Record, torque: Vector, known: Uncertainty,
     for index in range(points):
         if link_of(handle, index, n) == link and place.log[index] > best:
             best, place.best = place.log[index], index
-    _average(place, handle, torque, known, points)
+    _average(place, handle, n, points)
 
 
 @compiled
 def _check(place: Record, handle: Record, known: Uncertainty) -> None:
-    """Follow how well the best point explains the torque at all; a single contact leaves n − 3 numbers free."""
-    free = place.torque.shape[0] - 3.0
+    """Tell whether what is remembered contradicts the torques of now, and how well any single contact explains these.
+
+    A single contact leaves n − 3 numbers free.
+    """
+    n = place.torque.shape[0]
+    link, free = min(place.link, n), n - 3.0
+    point, force = stack_vector(3), stack_vector(3)
+    force_into(handle, place.all, place.best, n, point, force)
+    left = left_over(handle, link, place.torque, known, point, force)
+    place.differs = 1 if left > most_by_noise(float(n)) else 0
     if free < 1.0:
         return
-    left = left_over(handle, place.best, place.torque, known, stack_vector(3), stack_vector(3)) / most_by_noise(free)
+    marginalise_moment(place.now.G[link - 1], place.now.h[link - 1], known.moment_variance)
+    force_into(handle, place.now, place.best, n, point, force)
+    left = left_over(handle, link, place.torque, known, point, force) / most_by_noise(free)
     place.left_over += (1.0 if place.turn == 1 else _CHECK) * (left - place.left_over)
 
 
 @compiled
-def _combine(place: Record, handle: Record, points: int) -> float:
-    """Fill the log of each place's probability, up to a constant, and return the largest.
-
-    The errors of several postures are alike, a sensor's bias or a link's mass: what they say is added up as if there
-    were only as many as the root of their number.
-    """
-    tool = max(handle.tool_places, 1)
-    alike, best = math.sqrt(place.postures + 1.0), _NEVER
+def _weigh(place: Record, handle: Record, points: int) -> float:
+    """Fill the log of each place's probability, up to a constant, and return the largest."""
+    tool, best = max(handle.tool_places, 1), _NEVER
     of_arm = math.log((1.0 - place.tool_prior) / max(points - tool, 1))
     of_tool = math.log(place.tool_prior / tool)
     for index in range(points):
-        prior = of_tool if index >= points - tool else of_arm
-        place.log[index] = (place.now[index] + place.memory[index]) / alike + prior
+        place.log[index] = place.compared[index] + (of_tool if index >= points - tool else of_arm)
         best = max(best, place.log[index])
     return best
 
 
 @compiled
-def _average(place: Record, handle: Record, torque: Vector, known: Uncertainty, points: int) -> None:
-    """Set point and force to the mean over the points about the best one, on the same part, by their probability."""
-    n, best, total = torque.shape[0], place.log[place.best], 0.0
-    point, force, normal, centre = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
-    point_into(handle, place.best, n, centre, normal)
+def _average(place: Record, handle: Record, n: int, points: int) -> None:
+    """Set point and force to the mean over the places about the best one, on the same part, by their probability."""
+    best, total = place.log[place.best], 0.0
+    point, force, centre = stack_vector(3), stack_vector(3), stack_vector(3)
+    force_into(handle, place.all, place.best, n, centre, force)
     place.point[:], place.force[:] = 0.0, 0.0
     for index in range(points):
         weight = math.exp(max(place.log[index] - best, -60.0))
-        if weight < _NEGLIGIBLE or point_into(handle, index, n, point, normal) != place.link:
+        if weight < _NEGLIGIBLE or link_of(handle, index, n) != place.link:
             continue
+        force_into(handle, place.all, index, n, point, force)
         if (point[0] - centre[0]) ** 2 + (point[1] - centre[1]) ** 2 + (point[2] - centre[2]) ** 2 > _ABOUT_M**2:
             continue
-        force_into(handle, index, torque, known, point, force)
         total += weight
         for k in range(3):
             place.point[k] += weight * point[k]

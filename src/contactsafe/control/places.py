@@ -4,11 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactsafe.control.evidence import Uncertainty, force_into, point_into
+from contactsafe.control.evidence import force_into, link_of
 from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.core.stack import stack_vector
 
 
 class Place(NamedTuple):
@@ -67,8 +66,7 @@ def _list(records: np.ndarray, index: int, weights: Vector, links: np.ndarray, p
     """Fill the log of each point's weight, its link, where it is and the likeliest force there."""
     c = records[index]
     found, n = c.state.localisation, c.state.arm.q.shape[0]
-    known, normal = Uncertainty(found.sigma, found.moment_variance), stack_vector(3)
     for k in range(weights.shape[0]):
         weights[k] = found.log[k]
-        links[k] = point_into(c.handle, k, n, point[k], normal)
-        force_into(c.handle, k, found.torque, known, point[k], force[k])
+        links[k] = link_of(c.handle, k, n)
+        force_into(c.handle, found.all, k, n, point[k], force[k])

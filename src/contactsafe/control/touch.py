@@ -63,10 +63,13 @@ def follow_touch(c: Record) -> None:
     ended = touch.touching != 0 and touch.ticks >= params.detection.dwell_ticks and quiet
     if began or ended:
         touch.touching, touch.ticks = 1 if began else 0, 0
-        forget_place(place, state.arm.q)
+        forget_place(place)
     if touch.touching != 0 and c.handle.place_points > c.handle.tool_places:
         known = Uncertainty(touch.sigma, moment_variance(touch.torque))
-        localise(place, c.handle, touch.torque, known, state.arm.q, _tool_prior(state, params.observer), state.step.dt)
+        localise(
+            place, c.handle, touch.torque, known, state.arm.q, state.baseline.weight,
+            _tool_prior(state, params.observer), state.step.dt,
+        )  # fmt: skip
     touch.kind, touch.probability = _kind(touch, place, state, params.classification.tool_contact_n)
 
 
