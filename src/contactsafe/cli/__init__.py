@@ -11,6 +11,7 @@ from contactsafe.cli.experiments import demo, experiment
 from contactsafe.cli.identification import identify, record
 from contactsafe.cli.logs import replay
 from contactsafe.cli.machine import bench, warmup
+from contactsafe.cli.robot import run
 from contactsafe.cli.training import train
 from contactsafe.core import process
 from contactsafe.core.errors import ContactSafeError
@@ -34,6 +35,7 @@ COMMANDS = {
     "replay": _Command(replay, parses=True),
     "identify": _Command(identify, parses=True),
     "record": _Command(record, parses=True),
+    "run": _Command(run, parses=True),
     "bench": _Command(bench),
     "warmup": _Command(warmup),
 }

@@ -20,7 +20,7 @@ def accept_target(held: Record, target: Record, params: Record) -> int:
     """
     if target.kept != 0:
         return 0
-    fault = _target_fault(target, params)
+    fault = target_fault(target, params)
     if fault != 0:
         return fault
     norm = math.sqrt(dot(target.quat, target.quat))
@@ -34,7 +34,8 @@ def accept_target(held: Record, target: Record, params: Record) -> int:
 
 
 @compiled
-def _target_fault(target: Record, params: Record) -> int:
+def target_fault(target: Record, params: Record) -> int:
+    """Return why a record with a target's fields is not sound, 0 where it is; `params` are those of impedance."""
     usable = all_usable(target.position) and all_usable(target.quat) and all_usable(target.q_posture)
     if not (usable and all_usable(target.K_task) and all_usable(target.D_task)):
         return BAD_TARGET

@@ -82,3 +82,16 @@ def act(
     """Move the targets of the controllers from start to stop by their actions; see `apply_action`."""
     for i in range(start, stop):
         apply_action(controllers[i], limits, rule, actions[i])
+
+
+@compiled(nogil=True)
+def apply_one(controllers: np.ndarray, i: int, limits: ActionLimits, rule: PostureRule, action: Vector) -> None:
+    """Run `apply_action` on one of an array of records."""
+    apply_action(controllers[i], limits, rule, action)
+
+
+@compiled(nogil=True)
+def look_at(controllers: np.ndarray, i: int, pose: Vector, target: Vector) -> None:
+    """Run `observed_pose`, (6,), and `observed_target`, (18,), on one of an array of records."""
+    observed_pose(controllers[i], pose)
+    observed_target(controllers[i], pose, target)

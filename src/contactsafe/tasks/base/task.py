@@ -75,6 +75,7 @@ class Task:
         mask_sampler: makes a MaskSampler; None where the task has no camera.
         scenes: makes of its configuration what the paper's experiments ask of it, see `contactsafe.experiments.task`;
             None where there is nothing.
+        robot: makes its `contactsafe.tasks.base.robot.RobotTask`; None where no real robot does it.
         warmup: what compiles besides, for `contactsafe warmup`: package that it needs, name, configuration, engine.
     """
 
@@ -86,6 +87,7 @@ class Task:
     scripted: Scripted = field(default_factory=lambda: RANDOM)
     mask_sampler: Callable[[], MaskSampler] | None = None
     scenes: Callable[..., Any] | None = None
+    robot: Callable[[], Any] | None = None
     warmup: tuple[tuple[str, str, TaskConfig, str], ...] = ()
 
     @property

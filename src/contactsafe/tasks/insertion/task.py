@@ -5,6 +5,7 @@ from typing import Any
 
 from contactsafe.tasks.base.task import Task, TaskOptions
 from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.robot import InsertionRobot
 from contactsafe.tasks.insertion.scenes import Insertion
 from contactsafe.tasks.insertion.scripted import SCRIPTED
 from contactsafe.tasks.insertion.tasks import InsertionTasks
@@ -43,4 +44,11 @@ PPO = {
 }
 """What PPO learns it with: 30 decisions a second, and more noise than by default."""
 
-TASK = Task(InsertionTasks, InsertionOptions, training_settings={"ppo": PPO}, scripted=SCRIPTED, scenes=Insertion)
+TASK = Task(
+    InsertionTasks,
+    InsertionOptions,
+    training_settings={"ppo": PPO},
+    scripted=SCRIPTED,
+    scenes=Insertion,
+    robot=InsertionRobot,
+)

@@ -23,7 +23,7 @@ from contactsafe.tasks.insertion.picture import TopView, paint
 from contactsafe.tasks.insertion.scene import PEG, block, peg_radius, table
 from contactsafe.tasks.insertion.step import OWN_FIELDS, REWARD_TERMS, begin, finish, parameters_dtype
 
-_STEEL = TipSurface(friction=0.3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
+STEEL = TipSurface(friction=0.3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
 """Steel between rubber finger tips, which yield: 10 kN/m beneath the arm's 4 kg."""
 
 
@@ -75,7 +75,7 @@ class InsertionTasks(Tasks):
     def furnish(self, world: WorldConfig) -> WorldConfig:
         """Return a world with table and block in it, and a peg of steel."""
         fixtures = (table(), block(self.config.mouth, self.hole_radius))
-        return replace(world, fixtures=fixtures, tip=_STEEL)
+        return replace(world, fixtures=fixtures, tip=STEEL)
 
     def prepare(self) -> None:
         """Take the weights for compiled code."""

@@ -52,6 +52,14 @@ AS_PAPER = Variant(
 )
 """Free-space controller, pose and latent alone, the reward in the paper's words, boards that differ in their ink."""
 
+
+def _robot() -> Any:
+    """Return the task for a real robot; pictures need OpenCV, which is loaded for it alone."""
+    from contactsafe.tasks.wiping.robot import WipingRobot
+
+    return WipingRobot()
+
+
 TASK = Task(
     WipingTasks,
     WipingOptions,
@@ -60,6 +68,7 @@ TASK = Task(
     scripted=SCRIPTED,
     mask_sampler=MaskSampler,
     scenes=Wiping,
+    robot=_robot,
     warmup=(
         ("cv2", ", photographs", WipingConfig(image_source="photograph"), "mujoco"),
         ("pybullet", " in PyBullet", WipingConfig(), "pybullet"),

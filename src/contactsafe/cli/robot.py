@@ -1,0 +1,223 @@
+"""`contactsafe run`: a policy on a Franka, or on a simulated one over the robot's own network protocol."""
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from contactsafe.cli.arms import CalibrationFile
+from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, task_of
+from contactsafe.control import presets
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.parse import docstring, one_of, parse
+from contactsafe.experiments.robot_run import RobotRun, robot_runs
+from contactsafe.hardware.control_process import ControlSettings, control
+from contactsafe.hardware.crew import Ending, Part, run_crew
+from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.franka_port import FrankaPort
+from contactsafe.hardware.recorder import record
+from contactsafe.hardware.states import REASONS, STATES
+from contactsafe.hardware.watchdog import watch
+from contactsafe.policy.robot_process import PolicySettings, Work, act_on_robot
+from contactsafe.results.experiment import to_json
+from contactsafe.robot import robots
+from contactsafe.robot.arm import Arm
+from contactsafe.sim.franka_process import SimulatedRobot
+from contactsafe.tasks import DEFAULT_TASK, task_by_name
+
+LOOPBACK = "127.0.0.1"
+"""Where the simulated robot listens, and nowhere else."""
+
+LOG, TRUTH = "run.mcap", "truth.npy"
+
+
+@dataclass(frozen=True)
+class Options:
+    """What can be asked of a run.
+
+    Attributes:
+        policy: folder of the policy's bundle.
+        task: what it does.
+        robot: address of the Franka's control.
+        simulated: run against a simulated Franka on this machine, over the robot's own protocol.
+        seconds: that the run takes at most.
+        controller: preset underneath.
+        against: preset of a second simulated run, to compare with; none for no second run.
+        rounds: of work, such as boards, after which a simulated run ends.
+        speed: factor on how fast the target moves, 0.05 to 1.
+        camera: serial number of the RealSense; the first one found where it is not given.
+        board: file that `contactsafe calibrate` wrote.
+        dry_run: look at robot and camera, print the checklist, move nothing.
+        alone: nothing pushes or meets the simulated arm.
+        lockstep: the simulated robot waits for each command, so that a run is the same again, however slow the machine.
+        seed: of what is drawn, of light and of noise.
+        out: folder for log and page.
+        calibration: what `contactsafe identify` wrote of the robot.
+        priority: of the control process under SCHED_FIFO; 0 for none.
+        json: print JSON instead of a table.
+    """
+
+    policy: Annotated[BundleFolder, tyro.conf.Positional] = None
+    task: TaskName = DEFAULT_TASK
+    robot: str | None = None
+    simulated: bool = False
+    seconds: float = 60.0
+    controller: Annotated[str, one_of(presets.PRESETS, presets.by_name, presets.FORM)] = "safe"
+    against: Annotated[str, one_of(("none", *presets.PRESETS), also=presets.FORM)] = "vices"
+    rounds: int = 3
+    speed: float = 1.0
+    camera: str | None = None
+    board: Path | None = None
+    dry_run: bool = False
+    alone: bool = False
+    lockstep: bool = False
+    seed: int = 0
+    out: Path = Path("runs/robot")
+    calibration: CalibrationFile = None
+    priority: int = 80
+    json: bool = False
+
+    def check(self) -> None:
+        """Refuse what cannot be."""
+        if self.simulated == (self.robot is not None):
+            raise InvalidInputError("give --robot ADDRESS for a Franka, or --simulated for one on this machine")
+        if not 1.0 <= self.seconds <= 86400.0:
+            raise InvalidInputError(f"seconds = {self.seconds}; give 1 to 86400")
+        if not 0.05 <= self.speed <= 1.0:
+            raise InvalidInputError(f"speed = {self.speed}; give 0.05 to 1")
+        if not 1 <= self.rounds <= 60:
+            raise InvalidInputError(f"rounds = {self.rounds}; give 1 to 60")
+        if not 0 <= self.priority <= 99:
+            raise InvalidInputError(f"priority = {self.priority}; give 1 to 99, or 0 for none")
+        if self.robot is not None and self.lockstep:
+            raise InvalidInputError("lockstep is for simulated robots; a real one does not wait")
+
+
+def run(arguments: Sequence[str]) -> None:
+    """Let a policy work on a Franka, gently, with all that a real robot needs around it.
+
+    The control loop, the policy, a flight recorder and a watchdog each have a process of their own. With --simulated
+    the same processes run against a simulated Franka that speaks the robot's own protocol on this machine, before a
+    whiteboard whose ink vanishes, while the arm is pushed and meets a bottle.
+    """
+    asked = parse(Options, "contactsafe run", arguments, description=docstring(run))
+    asked.check()
+    described = task_by_name(task_of(arguments))
+    if described.robot is None:
+        raise InvalidInputError(f"task '{described.name}' says nothing of real robots; see docs/howto/own_task.md")
+    bundle = load_bundle(asked.policy, described.name)
+    task = described.robot()
+    arm = robots.fr3(task.tool)
+    if asked.calibration is not None:
+        arm = robots.calibrated(arm, asked.calibration)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    if not asked.simulated:
+        from contactsafe.cli.real_robot import run_real
+
+        run_real(asked, task, arm, bundle)
+        return
+    names = [asked.controller] + ([] if asked.against == "none" or asked.dry_run else [asked.against])
+    _show(asked, [_simulated(asked, task, arm, bundle.folder, name) for name in dict.fromkeys(names)])
+
+
+def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str) -> RobotRun:
+    """Run once against the simulated robot."""
+    folder = asked.out / controller.replace(":", "-")
+    folder.mkdir(parents=True, exist_ok=True)
+    exchange = Exchange.create(arm.n)
+    exchange.board["lockstep"] = asked.lockstep
+    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone)
+    robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
+    try:
+        with robot:
+            said = {"robot": "fr3", "task": asked.task, "controller": controller, "seed": str(asked.seed)}
+            parts = parts_of(asked, arm, bundle, simulated.work, controller, LOOPBACK, folder / LOG, said)
+            ending = run_crew(exchange, parts, asked.seconds, StatusLine())
+        return RobotRun(controller, np.load(folder / TRUTH), ending, simulated.figures(), bool(simulated.scene.pushes))
+    finally:
+        exchange.unlink()
+        simulated.close()
+
+
+def parts_of(
+    asked: Options, arm: Arm, bundle: Path, work: Work, controller: str, address: str, log: Path, said: dict[str, str]
+) -> list[Part]:
+    """Return the processes of a run."""
+    from contactsafe.hardware.realtime import Realtime
+
+    rights = Realtime(0 if asked.lockstep else asked.priority)
+    port = FrankaPort(address, load_of(arm))
+    settings = ControlSettings(arm, presets.by_name(controller), port, asked.lockstep, rights)
+    rounds = asked.rounds if asked.simulated else 0
+    policy = PolicySettings(arm, bundle, work, asked.speed, asked.lockstep, rounds)
+    return [
+        Part("watchdog", watch),
+        Part("recorder", record, (log, said)),
+        Part("control", control, (settings,)),
+        Part("policy", act_on_robot, (policy,)),
+    ]
+
+
+def load_of(arm: Arm) -> tuple[float, np.ndarray, np.ndarray] | None:
+    """Return what the tool adds to the hand that the robot's own settings know: mass, centre in the flange, inertia."""
+    from contactsafe.robot.franka import HAND
+
+    tool = arm.tool
+    extra = 0.0 if tool is None else tool.inertia.mass - HAND.inertia.mass
+    if tool is None or extra <= 1e-3:
+        return None
+    mass, hand = tool.inertia.mass, HAND.inertia
+    centre = (mass * np.array(tool.inertia.com) - hand.mass * np.array(hand.com)) / extra
+    return extra, centre, np.zeros((3, 3))
+
+
+class StatusLine:
+    """One line on a terminal that says how a run goes; elsewhere a line every five seconds."""
+
+    def __init__(self) -> None:
+        self._live, self._last = sys.stderr.isatty(), 0.0
+
+    def __call__(self, board: np.void) -> None:
+        """Say it."""
+        now = time.monotonic()
+        if now - self._last < (0.2 if self._live else 5.0):
+            return
+        self._last = now
+        state = STATES[int(board["state"])]
+        reason = f" ({REASONS[int(board['reason'])].name})" if board["reason"] else ""
+        contact = f"link {board['contact_link']} {board['contact_nm']:.0f} N m" if board["contact_link"] else "none"
+        counts = np.cumsum(board["busy"])
+        busy = int(np.searchsorted(counts, 0.99 * counts[-1])) if counts[-1] else 0
+        line = (
+            f"{board['tick'] / 1000:6.1f} s  {state}{reason}  contact {contact}  tool {board['tool_n']:.0f} N  "
+            f"target {board['target_age']} ms old  busy {busy} µs  lost {board['lost']}  refused {board['refused']}"
+        )
+        print(f"\r{line:110s}" if self._live else line, end="" if self._live else "\n", file=sys.stderr, flush=True)
+
+
+def _show(asked: Options, runs: Sequence[RobotRun]) -> None:
+    """Print the figures, write the page, and fail where a run did not end as it should."""
+    from contactsafe.report import terminal_table, write_report
+    from contactsafe.report.summary import summarise
+
+    results, info = [robot_runs(runs, asked.seed)], {"seeds": [asked.seed], "command": "contactsafe run --simulated"}
+    page = write_report(asked.out, results, info)
+    print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
+    print(f"report: {page}", file=sys.stderr)
+    for one in runs:
+        refuse_failed(one.ending, one.controller)
+
+
+def refuse_failed(ending: Ending, name: str) -> None:
+    """Say why a run did not end as it should.
+
+    Raises:
+        InvalidInputError: it did not.
+    """
+    if not ending.went_well:
+        raise InvalidInputError(f"the run under {name} ended {ending.state}: {ending.reason}; {ending.remedy}")

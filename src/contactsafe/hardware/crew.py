@@ -1,0 +1,164 @@
+"""All processes of a run: started, told to begin once all are ready, followed, and seen off."""
+
+import multiprocessing
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+import numpy as np
+
+from contactsafe.core.errors import ContactSafeError
+from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.states import ASKED, REASONS, STATES, STOPPED, TIME_UP, WELL
+
+_READY_S = 600.0
+"""The first run on a machine compiles for minutes."""
+
+_EVERY_S = 0.05
+
+
+class RunError(ContactSafeError):
+    """A run did not come about."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A process of a run.
+
+    Attributes:
+        name: "control", "policy", "recorder" or "watchdog".
+        target: what it does; called with the path of the shared memory, then `arguments`.
+        arguments: that can be pickled.
+    """
+
+    name: str
+    target: Callable[..., None]
+    arguments: tuple[Any, ...] = ()
+
+
+@dataclass
+class Ending:
+    """How a run ended.
+
+    Attributes:
+        state, reason: by name.
+        remedy: what a person is to do; empty where all went well.
+        went_well: whether it ended as it should.
+        ticks: of the control loop.
+        refused: targets that were.
+        lost: states of the robot that did not come.
+        first_step_nm, largest_step_nm: changes of a torque, in the first command and in any other.
+        busy_us: busy part of a tick: median, 99th percentile and most, µs, and ticks over 500 µs.
+        recorded: ticks in the log.
+        recorder_errno: why it ends early, 0 where it does not.
+    """
+
+    state: str
+    reason: str
+    remedy: str
+    went_well: bool
+    ticks: int
+    refused: int
+    lost: int
+    first_step_nm: float
+    largest_step_nm: float
+    busy_us: tuple[int, int, int, int]
+    recorded: int
+    recorder_errno: int = 0
+    said: list[str] = field(default_factory=list)
+
+
+def run_crew(
+    exchange: Exchange, parts: list[Part], seconds: float, on_look: Callable[[np.void], None] | None = None
+) -> Ending:
+    """Run all processes until the work is done, the time is up, Ctrl-C, or something goes wrong.
+
+    Args:
+        exchange: of the run; it is gone afterwards.
+        parts: the processes; all but control and watchdog may be left out.
+        seconds: for which it runs at most, by the robot's ticks; inf for no end.
+        on_look: called some twenty times a second with the run's board.
+
+    Raises:
+        RunError: a process ended before the run could begin.
+    """
+    context, board = multiprocessing.get_context("spawn"), exchange.board
+    processes = {
+        part.name: context.Process(target=part.target, args=(str(exchange.path), *part.arguments)) for part in parts
+    }
+    try:
+        for process in processes.values():
+            process.start()
+        _wait_until_ready(processes, exchange)
+        board["go"] = 1
+        with _asked_by_signal(exchange):
+            while processes["control"].is_alive() and not board["finished"][0]:
+                board["beat_command"] += 1
+                if board["tick"][0] >= 1000.0 * seconds:
+                    exchange.ask_to_stop(TIME_UP)
+                if on_look:
+                    on_look(board[0])
+                time.sleep(_EVERY_S)
+    finally:
+        exchange.ask_to_stop(ASKED)
+        _see_off(processes, exchange)
+    return ending_of(exchange)
+
+
+def _wait_until_ready(processes: dict[str, BaseProcess], exchange: Exchange) -> None:
+    """Wait until control and policy have compiled, loaded and opened what they need."""
+    board, until = exchange.board, time.monotonic() + _READY_S
+    awaited = [name for name in ("control", "policy", "watchdog") if name in processes]
+    while not all(board[f"beat_{name}"][0] for name in awaited):
+        board["beat_command"] += 1
+        gone = [name for name in processes if not processes[name].is_alive()]
+        if gone or time.monotonic() > until:
+            board["finished"] = 1
+            raise RunError(f"the {gone[0] if gone else awaited[0]} process did not get ready; it said why above")
+        time.sleep(_EVERY_S)
+
+
+@contextmanager
+def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
+    """Bring the arm to rest on Ctrl-C and SIGTERM, instead of dying of them."""
+
+    def ask(*_: Any) -> None:
+        exchange.ask_to_stop(ASKED)
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _see_off(processes: dict[str, BaseProcess], exchange: Exchange) -> None:
+    """Wait for all to end; the watchdog ends whoever does not, and this does where there is none."""
+    until = time.monotonic() + 12.0
+    while any(process.is_alive() for process in processes.values()) and time.monotonic() < until:
+        exchange.board["beat_command"] += 1
+        time.sleep(_EVERY_S)
+    for process in processes.values():
+        if process.is_alive():
+            process.kill()
+        process.join(1.0)
+    exchange.unlink()
+
+
+def ending_of(exchange: Exchange) -> Ending:
+    """Return how a run ended."""
+    board = exchange.board[0]
+    state, reason = int(board["state"]), int(board["reason"])
+    counts = np.cumsum(board["busy"])
+    median, late, most = (int(np.searchsorted(counts, fraction * counts[-1])) for fraction in (0.5, 0.99, 1.0))
+    well = state == STOPPED and reason in WELL and board["recorder_errno"] == 0
+    return Ending(
+        STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(board["tick"]),
+        int(board["refused"]), int(board["lost"]), float(board["first_step_nm"]), float(board["largest_step_nm"]),
+        (median, late, most, int(board["busy"][500:].sum())), int(board["recorded"]), int(board["recorder_errno"]),
+    )  # fmt: skip

@@ -1,0 +1,153 @@
+"""The shared memory of a run: mailboxes, heartbeats and the recorder's rings, in one file in /dev/shm.
+
+Whoever opens it maps the same bytes; every number has one writer. The file is unlinked by the watchdog, and by the
+command where that has died.
+"""
+
+import contextlib
+import mmap
+import os
+from pathlib import Path
+
+import numpy as np
+
+from contactsafe.core.errors import InvalidInputError, OutputError
+from contactsafe.hardware.messages import message_dtype, row_dtype, seen_dtype, step_dtype
+
+FOLDER = Path("/dev/shm")
+PREFIX = "contactsafe-run-"
+
+TICKS, STEPS = 8192, 1024
+"""Rows that the rings hold: eight seconds of ticks, seventeen of policy steps."""
+
+BUSY_BINS = 2000
+"""Of the histogram of the loop's busy time, 1 µs each, the last one for all above."""
+
+_i = np.int64
+_f = np.float64
+
+board_dtype = np.dtype(
+    [
+        ("joints", _i),
+        ("lockstep", _i),  # the control process waits for the policy's targets, tick by tick
+        ("beat_control", _i),  # counts up while a process lives
+        ("beat_policy", _i),
+        ("beat_watchdog", _i),
+        ("beat_recorder", _i),
+        ("beat_command", _i),
+        ("pid_control", _i),
+        ("pid_policy", _i),
+        ("pid_watchdog", _i),
+        ("pid_recorder", _i),
+        ("pid_command", _i),
+        ("ready_policy", _i),  # it waits for the first state
+        ("go", _i),  # the control process may begin
+        ("stop", _i),  # reason for which the run is to end, 0 for none; first one stays
+        ("state", _i),  # of the control process
+        ("reason", _i),
+        ("tick", _i),
+        ("steps", _i),  # of the policy
+        ("target_age", _i),  # ticks
+        ("refused", _i),  # targets
+        ("lost", _i),  # states of the robot that did not come
+        ("waits_for_robot", _i),  # the control process waits for the robot's next state
+        ("finished", _i),  # the control process has let go of the robot
+        ("recorded", _i),  # ticks written
+        ("dropped", _i),  # ticks that the recorder was too slow for
+        ("recorder_errno", _i),  # why it writes no more, 0 while it does
+        ("first_step_nm", _f),  # largest change of a torque in the first command
+        ("largest_step_nm", _f),  # and in any later one
+        ("tool_speed", _f),  # m/s
+        ("contact_link", _i),  # 0 for none
+        ("contact_nm", _f),  # size of its torque
+        ("tool_n", _f),  # force on the tool
+        ("busy", _i, (BUSY_BINS,)),  # histogram
+        ("rows", _i),  # ticks put into the ring
+        ("steps_written", _i),  # steps put into theirs
+    ]
+)
+
+
+class Exchange:
+    """One run's shared memory, mapped.
+
+    Args:
+        path: of the file; made by `create`.
+
+    Attributes:
+        board: `board_dtype` record of heartbeats, states and figures.
+        targets, seen: mailboxes, int64 words.
+        ticks, steps: rings of `row_dtype` and `step_dtype` records.
+    """
+
+    def __init__(self, path: Path | str):
+        self.path = Path(path)
+        try:
+            with open(self.path, "r+b") as file:
+                self._map = mmap.mmap(file.fileno(), 0)
+        except (OSError, ValueError) as error:
+            raise InvalidInputError(f"{self.path} is no run's shared memory ({error}); start the run anew") from None
+        self.board = np.frombuffer(self._map, board_dtype, 1)
+        n = int(self.board["joints"][0])
+        offsets = _offsets(n)
+        self.targets = self._words(offsets["targets"], message_dtype(n))
+        self.seen = self._words(offsets["seen"], seen_dtype(n))
+        self.ticks = np.frombuffer(self._map, row_dtype(n), TICKS, offsets["ticks"])
+        self.steps = np.frombuffer(self._map, step_dtype(), STEPS, offsets["steps"])
+
+    def _words(self, offset: int, message: np.dtype) -> np.ndarray:
+        return np.frombuffer(self._map, np.int64, 1 + message.itemsize // 8, offset)
+
+    @property
+    def joints(self) -> int:
+        """Of the arm."""
+        return int(self.board["joints"][0])
+
+    def ask_to_stop(self, reason: int) -> None:
+        """Have the control process bring the arm to rest; the first reason stays."""
+        if self.board["stop"][0] == 0:
+            self.board["stop"][0] = reason
+
+    @classmethod
+    def create(cls, n: int) -> "Exchange":
+        """Make the shared memory of a run for an arm of n joints.
+
+        Raises:
+            OutputError: there is no room for it.
+        """
+        path = FOLDER / f"{PREFIX}{os.getpid()}"
+        size = _offsets(n)["end"]
+        try:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be made ({error.strerror}); a run needs {size >> 20} MB there") from None
+        try:
+            os.posix_fallocate(handle, 0, size)
+            os.pwrite(handle, np.array([n], np.int64).tobytes(), board_dtype.fields["joints"][1])  # type: ignore[index]
+        except OSError as error:
+            os.unlink(path)
+            raise OutputError(f"{path}: {error.strerror}; a run needs {size >> 20} MB there") from None
+        finally:
+            os.close(handle)
+        return cls(path)
+
+    def unlink(self) -> None:
+        """Remove the file; what is mapped stays until its processes end."""
+        with contextlib.suppress(FileNotFoundError):
+            self.path.unlink()
+
+
+def _offsets(n: int) -> dict[str, int]:
+    """Return where each part begins, bytes, on cache lines of their own."""
+    parts = {
+        "board": board_dtype.itemsize,
+        "targets": 8 + message_dtype(n).itemsize,
+        "seen": 8 + seen_dtype(n).itemsize,
+        "ticks": TICKS * row_dtype(n).itemsize,
+        "steps": STEPS * step_dtype().itemsize,
+    }
+    offsets, at = {}, 0
+    for name, size in parts.items():
+        offsets[name] = at
+        at += -(-size // 64) * 64
+    return offsets | {"end": at}

@@ -1,0 +1,132 @@
+"""A Franka Research 3 by Franka's own client library, pylibfranka."""
+
+import contextlib
+import functools
+from typing import Any
+
+import numpy as np
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.hardware.port import RobotError
+
+COLLISION_NM, COLLISION_N = 60.0, 100.0
+"""Torques and forces of contact from which the robot stops by itself: beyond what this controller lets a contact have
+on an arm (30 N m, and what an impact adds), short of what breaks the arm."""
+
+_RATE_NM = 1.0
+"""A tick's change of torque that Franka's interface allows, N m: 1000 N m/s."""
+
+_MISSING = "pylibfranka is not installed; install contactsafe[franka]"
+
+
+@functools.cache
+def _library() -> Any:
+    try:
+        import pylibfranka
+    except ImportError:
+        raise InvalidInputError(_MISSING) from None
+    return pylibfranka
+
+
+class FrankaPort:
+    """One robot, by its address.
+
+    Args:
+        address: host name or address of its control.
+        load: what the flange carries beyond what the robot was told in its own settings: mass, kg, centre of mass in
+            the flange's frame, (3,), m, and inertia, (3, 3), kg m²; None to leave it as it is.
+    """
+
+    def __init__(self, address: str, load: tuple[float, np.ndarray, np.ndarray] | None = None):
+        _library()
+        self._address, self._load = address, load
+        self._robot = self._control = None
+        self.torque_rate = np.full(7, _RATE_NM)
+
+    @property
+    def _library(self) -> Any:
+        return _library()
+
+    def connect(self) -> None:
+        """Reach the robot; raise what it takes for a collision, tell it the load."""
+        with _named(self._library):
+            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+            torques, forces = [COLLISION_NM] * 7, [COLLISION_N] * 6
+            self._robot.set_collision_behavior(torques, torques, forces, forces)
+            if self._load is not None:
+                mass, centre, inertia = self._load
+                self._robot.set_load(mass, list(centre), list(np.asarray(inertia).reshape(9, order="F")))
+
+    def look(self, reading: np.ndarray) -> None:
+        """Fill a reading of a robot at rest."""
+        with _named(self._library):
+            _fill(reading, self._robot.read_once())
+
+    def begin(self) -> None:
+        """Take control."""
+        with _named(self._library):
+            self._control = self._robot.start_torque_control()
+
+    def read(self, reading: np.ndarray) -> int:
+        """Wait for the next state, a second at most; return the milliseconds since the last."""
+        with _named(self._library):
+            state, passed = self._control.readOnce()
+        _fill(reading, state)
+        return round(1000.0 * passed.to_sec())
+
+    def write(self, torque: np.ndarray) -> None:
+        """Send joint torques, (7,), N m, gravity not included."""
+        with _named(self._library):
+            self._control.writeOnce(self._library.Torques(torque.tolist()))
+
+    def finish(self) -> None:
+        """End the motion: the robot holds itself."""
+        last = self._library.Torques([0.0] * 7)
+        last.motion_finished = True
+        with _named(self._library):
+            self._control.writeOnce(last)
+        self._control = None
+
+    def recover(self) -> None:
+        """Clear errors, as the robot lets a program do."""
+        with _named(self._library):
+            self._robot.automatic_error_recovery()
+
+    def close(self) -> None:
+        """Let go of the connection; a motion that runs is ended by the robot."""
+        self._control = self._robot = None
+
+    def errors(self) -> tuple[str, ...]:
+        """Return the errors that the robot reports now, by libfranka's names."""
+        with contextlib.suppress(RobotError), _named(self._library):
+            state = self._robot.read_once()
+            return error_names(state.current_errors) or error_names(state.last_motion_errors)
+        return ()
+
+
+def error_names(errors: Any) -> tuple[str, ...]:
+    """Return the names of the flags that are set in libfranka's `Errors`."""
+    names = (name for name in dir(errors) if not name.startswith("_"))
+    return tuple(name for name in names if getattr(errors, name) is True)
+
+
+def _fill(reading: np.ndarray, state: Any) -> None:
+    row = reading[0]
+    row["time"] = round(1000.0 * state.time.to_sec()) / 1000.0
+    row["q"], row["qd"], row["torque"], row["commanded"] = state.q, state.dq, state.tau_J, state.tau_J_d
+    row["success_rate"], row["mode"] = state.control_command_success_rate, int(state.robot_mode)
+
+
+@contextlib.contextmanager
+def _named(library: Any) -> Any:
+    """Raise what the library raises as a `RobotError` with libfranka's names of what went wrong."""
+    try:
+        yield
+    except (library.FrankaException, RuntimeError, ValueError) as error:
+        raise RobotError(_names_in(str(error)), " ".join(str(error).split())[:300]) from None
+
+
+def _names_in(text: str) -> tuple[str, ...]:
+    """Return the names of libfranka's errors that a message has in brackets: `aborted by reflex! ["a", "b"]`."""
+    inside = text.partition("[")[2].partition("]")[0]
+    return tuple(name.strip().strip('"') for name in inside.split(",") if name.strip())

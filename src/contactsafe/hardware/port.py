@@ -1,0 +1,62 @@
+"""The few functions that stand between the control process and a robot."""
+
+from typing import Protocol
+
+import numpy as np
+
+from contactsafe.core.errors import ContactSafeError
+
+
+class RobotError(ContactSafeError):
+    """The robot has stopped by itself, cannot be reached, or refuses.
+
+    Args:
+        names: of its errors, as the robot calls them.
+        detail: what its library said.
+    """
+
+    def __init__(self, names: tuple[str, ...], detail: str):
+        super().__init__(f"{', '.join(names) or 'robot error'}: {detail}")
+        self.names = names
+
+
+class RobotPort(Protocol):
+    """A torque-controlled robot of one kind.
+
+    Torques are without gravity, which these robots add; a reading has it in the torque measured.
+    """
+
+    torque_rate: np.ndarray
+    """Most that the robot lets each joint's torque change in a tick, (n,), N m."""
+
+    def connect(self) -> None:
+        """Reach the robot and prepare it; it does not move. Raises `RobotError`."""
+        ...
+
+    def look(self, reading: np.ndarray) -> None:
+        """Fill a reading of a robot that is not controlled; `reading_dtype`, one record."""
+        ...
+
+    def begin(self) -> None:
+        """Take control; from now on `read` and `write` follow each other within a tick."""
+        ...
+
+    def read(self, reading: np.ndarray) -> int:
+        """Wait for the next cycle and fill its reading; return how many milliseconds passed since the last."""
+        ...
+
+    def write(self, torque: np.ndarray) -> None:
+        """Send joint torques, (n,), N m."""
+        ...
+
+    def finish(self) -> None:
+        """Give control back: the robot holds itself."""
+        ...
+
+    def recover(self) -> None:
+        """Clear what errors it may clear by itself."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        ...

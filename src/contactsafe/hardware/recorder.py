@@ -1,0 +1,189 @@
+"""The flight recorder: a process that takes ticks and policy steps out of their rings and writes them to MCAP.
+
+Nothing of it is in the control loop, and what it has written can be read after any process was killed: messages stand
+one behind the other in the file, and each write reaches the system at once.
+"""
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.hardware.exchange import Exchange
+
+TICKS_TOPIC, STEPS_TOPIC = "/contactsafe/ticks", "/contactsafe/steps"
+RUN = "contactsafe run"
+"""Name of the metadata that say what ran."""
+
+_EVERY_S = 0.02
+_CDR = b"\x00\x01\x00\x00"
+"""Head of a little-endian CDR message; records of 64-bit numbers follow as they lie in memory."""
+
+_ALONE_S = 3.0
+
+
+def ros_schema(dtype: np.dtype, name: str) -> str:
+    """Return the ROS 2 message definition of a record of 64-bit numbers, its nested records behind it."""
+    nested: dict[str, np.dtype] = {}
+
+    def lines(record: np.dtype) -> str:
+        out = []
+        for field in record.names or ():
+            base, shape = record[field].base, record[field].shape
+            count = f"[{int(np.prod(shape))}]" if shape else ""
+            if base.names:
+                kind = f"contactsafe/{field.title().replace('_', '')}"
+                nested[kind] = base
+            else:
+                kind = "int64" if base.kind == "i" else "float64"
+            out.append(f"{kind}{count} {field.lower()}")
+        return "\n".join(out)
+
+    text, done = lines(dtype), set[str]()
+    while todo := [kind for kind in nested if kind not in done]:
+        done.add(todo[0])
+        text += f"\n{'=' * 80}\nMSG: {todo[0]}\n{lines(nested[todo[0]])}"
+    return text
+
+
+class _File:
+    """Every write goes to the system at once."""
+
+    def __init__(self, path: Path):
+        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
+        self._at = 0
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data)
+        while len(view):
+            view = view[os.write(self._handle, view) :]
+        self._at += len(memoryview(data))
+        return len(memoryview(data))
+
+    def tell(self) -> int:
+        return self._at
+
+    def flush(self) -> None:
+        pass
+
+    def close(self) -> None:
+        os.close(self._handle)
+
+
+class Recorder:
+    """Writes one run.
+
+    Args:
+        exchange: of the run.
+        path: of the file.
+        run: what runs, for whoever reads it: texts by name.
+    """
+
+    def __init__(self, exchange: Exchange, path: Path, run: Mapping[str, str]):
+        try:
+            from mcap.writer import Writer
+        except ImportError:
+            raise InvalidInputError("mcap is not installed; run: pip install 'contactsafe[mcap]'") from None
+        self.exchange, self._file = exchange, _File(path)
+        self._writer = Writer(self._file, use_chunking=False)
+        self._writer.start(profile="ros2", library="contactsafe")
+        self._writer.add_metadata(RUN, {name: str(value) for name, value in run.items()})
+        self._ticks = self._channel(TICKS_TOPIC, exchange.ticks.dtype, "Tick")
+        self._steps = self._channel(STEPS_TOPIC, exchange.steps.dtype, "Step")
+        self._at = {"rows": 0, "steps_written": 0}
+
+    def _channel(self, topic: str, dtype: np.dtype, name: str) -> int:
+        schema = self._writer.register_schema(
+            name=f"contactsafe/msg/{name}", encoding="ros2msg", data=ros_schema(dtype, name).encode()
+        )
+        return self._writer.register_channel(topic=topic, message_encoding="cdr", schema_id=schema)
+
+    def drain(self) -> None:
+        """Write what has come since the last time."""
+        board = self.exchange.board
+        self._take(self.exchange.ticks, "rows", self._ticks)
+        self._take(self.exchange.steps, "steps_written", self._steps)
+        board["recorded"] = self._at["rows"]
+
+    def _take(self, ring: np.ndarray, counter: str, channel: int) -> None:
+        board, size = self.exchange.board, len(ring)
+        upto = int(board[counter][0])
+        first = max(self._at[counter], upto - size + 64)  # what is about to be written over is left alone
+        if counter == "rows":
+            board["dropped"] += first - self._at[counter]
+        for number in range(first, upto):
+            row = ring[number % size]
+            stamp = int(row["stamp"])
+            self._writer.add_message(
+                channel_id=channel, log_time=stamp, publish_time=stamp, data=_CDR + row.tobytes(), sequence=number
+            )
+        self._at[counter] = upto
+
+    def finish(self) -> None:
+        """Write the end of the file."""
+        self._writer.finish()
+        self._file.close()
+
+
+def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
+    """Be the recorder of a run, until the control process has let go of the robot, or nobody is left."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    exchange = Exchange(exchange_path)
+    board = exchange.board
+    board["pid_recorder"] = os.getpid()
+    try:
+        recorder = Recorder(exchange, path, run)
+        beat, heard = -1, time.monotonic()
+        while not board["finished"][0] and time.monotonic() - heard < _ALONE_S:
+            board["beat_recorder"] += 1
+            recorder.drain()
+            if board["beat_watchdog"][0] != beat:
+                beat, heard = int(board["beat_watchdog"][0]), time.monotonic()
+            time.sleep(_EVERY_S)
+        recorder.drain()
+        recorder.finish()
+    except OSError as error:
+        board["recorder_errno"] = error.errno or -1
+        print(f"recorder: {path}: {error.strerror}; the run goes on without a log from here", flush=True)
+    except InvalidInputError as error:
+        board["recorder_errno"] = -1
+        print(f"recorder: {error}", flush=True)
+
+
+def read_run(path: Path, dtype: np.dtype, topic: str = TICKS_TOPIC) -> tuple[dict[str, str], np.ndarray]:
+    """Read a run that was recorded, also one whose file ends in the middle.
+
+    Args:
+        path: of the file.
+        dtype: of the topic's records, `row_dtype(n)` or `step_dtype()`.
+        topic: of them.
+
+    Returns:
+        What ran, by name, and the records in order.
+
+    Raises:
+        InvalidInputError: it is no recorded run.
+    """
+    from mcap.exceptions import McapError
+    from mcap.records import Channel, Message, Metadata
+    from mcap.stream_reader import StreamReader
+
+    run: dict[str, str] = {}
+    rows, channels = [], set[int]()
+    with open(path, "rb") as file, contextlib.suppress(McapError, EOFError):
+        for item in StreamReader(file).records:
+            if isinstance(item, Metadata) and item.name == RUN:
+                run = dict(item.metadata)
+            elif isinstance(item, Channel) and item.topic == topic:
+                channels.add(item.id)
+            elif isinstance(item, Message) and item.channel_id in channels:
+                rows.append(item.data[len(_CDR) :])
+    if not run or any(len(row) != dtype.itemsize for row in rows):
+        raise InvalidInputError(f"{path} is no run that this version of contactsafe has recorded")
+    return run, np.frombuffer(b"".join(rows), dtype)

@@ -1,0 +1,59 @@
+"""What a task supplies to be run on a real robot, and on a simulated one over the robot's own network protocol."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from contactsafe.policy.robot_process import Work
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.description import Tool
+from contactsafe.sim.franka_meetings import bottle_in_the_way, pushes
+from contactsafe.sim.franka_scene import FrankaScene
+from contactsafe.sim.franka_server import Effect
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A run on a simulated robot.
+
+    Attributes:
+        scene: about the robot.
+        effect: of the tool on it.
+        work: of the policy.
+        figures: what was achieved, by name, after the run.
+        close: removes what it left.
+    """
+
+    scene: FrankaScene
+    effect: Effect | None
+    work: Work
+    figures: Callable[[], dict[str, float]] = field(default=dict)
+    close: Callable[[], None] = lambda: None
+
+
+class RobotTask(Protocol):
+    """A task that a real robot can do."""
+
+    tool: Tool
+
+    def work(self, **looks: Any) -> Work:
+        """Return the work on a real robot, with what it looks with."""
+        ...
+
+    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
+        """Return a run on a simulated one.
+
+        Args:
+            arm: that works.
+            shared: beginning of the names of shared memory that it may make.
+            seed: of what is drawn at random.
+            rounds: of work.
+            met: a person pushes the arm and holds a bottle against it.
+        """
+        ...
+
+
+def met_by(scene: FrankaScene, arm: Arm) -> FrankaScene:
+    """Return a scene with a bottle in the wrist's way from home, and a person who pushes the arm."""
+    return replace(scene, pushes=pushes(), obstacles=(bottle_in_the_way(arm),))

@@ -1,0 +1,46 @@
+"""Wiping on a Franka, and on a simulated one before a whiteboard whose ink vanishes."""
+
+from pathlib import Path
+from typing import Any
+
+from contactsafe.robot.arm import Arm
+from contactsafe.robot.franka import WIPER
+from contactsafe.sim.fixtures import TipSurface, workbench
+from contactsafe.sim.franka_meetings import WORK_BEGINS_S
+from contactsafe.sim.franka_scene import FrankaScene
+from contactsafe.tasks.base.robot import Simulated, met_by
+from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
+from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard
+from contactsafe.tasks.wiping.robot_work import WipingWork
+
+
+class WipingRobot:
+    """The wiping task for a real robot."""
+
+    tool = WIPER
+
+    def work(self, **looks: Any) -> WipingWork:
+        """Return the work, with the pictures that it looks at."""
+        config = WipingConfig()
+        return WipingWork(looks["pictures"], config.board, config.camera, config.action)
+
+    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
+        """Return a run before boards of random strokes, seen in photographs."""
+        config, path = WipingConfig(), shared.with_name(f"{shared.name}-board")
+        board, tip = config.board, self.tool.tip
+        create_shown(path, board)
+        assert tip is not None
+        effect = WipedBoard(path, board, tip.half_size, "strokes", seed, rounds, first_s=WORK_BEGINS_S if met else 0.0)
+        work = self.work(pictures=PhotographedBoard(path, arm, board, config.camera, seed))
+        scene = FrankaScene(self.tool, TipSurface(friction=board.friction), (workbench(board.centre, board.size),))
+        shown = map_shown(path, board)
+
+        def figures() -> dict[str, float]:
+            started, left = shown["ink_start"][0][:rounds], shown["ink"][0][:rounds]
+            drawn = started > 0
+            gone = 1.0 - left[drawn] / started[drawn]
+            done = {f"done, ink gone from board {k + 1}": float(x) for k, x in enumerate(gone)}
+            return {"boards drawn on": float(drawn.sum()), **done}
+
+        return Simulated(met_by(scene, arm) if met else scene, effect, work, figures, path.unlink)

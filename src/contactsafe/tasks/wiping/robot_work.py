@@ -1,0 +1,110 @@
+"""Wiping on a real robot: pictures of the board become masks, as in training, and ink says when there is work."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from contactsafe.policy.action import DOWN
+from contactsafe.policy.action_config import ActionConfig
+from contactsafe.robot.arm import Arm, Pose
+from contactsafe.sim.config import WorldConfig
+from contactsafe.sim.scene import build_plant
+from contactsafe.tasks.wiping.board import BoardConfig, Camera
+from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.vision.segment import Segmenter
+
+_START_M = 0.06
+"""Above the board's middle."""
+
+_CLEAN_LOOKS, _INKED_LOOKS = 20, 6
+"""New pictures in a row without ink after which a board is clean, and with ink after which there is work."""
+
+_LEAST_PX = 3
+"""A mask of fewer inked pixels shows none."""
+
+
+class Pictures(Protocol):
+    """What takes pictures of the board."""
+
+    def open(self) -> None:
+        """Begin, in the policy's process."""
+        ...
+
+    def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
+        """Return the newest picture, uint8 (455, 455, 3), its number, and its age, ms."""
+        ...
+
+    def close(self) -> None:
+        """End."""
+        ...
+
+
+@dataclass
+class WipingWork:
+    """What the wiping task supplies for a real robot.
+
+    Attributes:
+        pictures: of the board.
+        board, camera, action: as the policy was trained with.
+    """
+
+    pictures: Pictures
+    board: BoardConfig = field(default_factory=BoardConfig)
+    camera: Camera = field(default_factory=Camera)
+    action: ActionConfig = field(default_factory=ActionConfig)
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """Middle of the board."""
+        return self.board.centre
+
+    @property
+    def start(self) -> Pose:
+        """Above it."""
+        return Pose(np.add(self.board.centre, [0.0, 0.0, _START_M]), DOWN)
+
+    @property
+    def homography(self) -> np.ndarray:
+        """Of the masks."""
+        from contactsafe.tasks.wiping.camera import plane_homography
+
+        return plane_homography(self.camera, self.board.centre[2])
+
+    def prepare(self, arm: Arm, lockstep: bool) -> None:
+        """Open the camera."""
+        del lockstep
+        self._eye = Photographer(self.camera, self.board, build_plant(arm, WorldConfig(fixtures=())))
+        self._segmenter = Segmenter(self._eye.homography, self._eye.corners, PHOTO_PX, self.camera.size)
+        self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
+        self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
+        self.pictures.open()
+
+    def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
+        """Segment the newest picture; where the arm hides the board is known by its joints."""
+        del pose, steps
+        picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
+        if number != self._number:
+            self._number = number
+            hidden = self._eye.hidden(self._eye.solids_at(seen["q"]))
+            self._mask = self._segmenter.segment(picture, hidden)
+            shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
+            self._clean = 0 if shows else self._clean + 1
+            self._inked = self._inked + 1 if shows else 0
+        return {"mask": self._mask[..., None], "force": np.asarray(seen["force"])}
+
+    def is_ready(self) -> bool:
+        """Tell whether ink is seen."""
+        return self._inked >= _INKED_LOOKS
+
+    def is_done(self) -> bool:
+        """Tell whether no ink has been seen for a while."""
+        return self._clean >= _CLEAN_LOOKS
+
+    def seen_with(self) -> tuple[float, int]:
+        """Return the picture's age and how much ink its mask shows."""
+        return self._age_ms, int(np.count_nonzero(self._mask == 0))
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        self.pictures.close()
