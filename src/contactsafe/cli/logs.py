@@ -71,10 +71,12 @@ class Options(LogOptions):
     Attributes:
         wrench: a log without a wrench is of an arm whose tool touches nothing.
         calibration: what `contactsafe identify` wrote of this robot.
+        torques: of a log of `contactsafe run`, compute every torque again and compare it bit by bit; nothing else.
     """
 
     wrench: bool = True
     calibration: CalibrationFile = None
+    torques: bool = False
 
 
 def replay(arguments: Sequence[str]) -> None:
@@ -87,12 +89,30 @@ def replay(arguments: Sequence[str]) -> None:
     from contactsafe.report import prepare_output
 
     asked = parse(Options, "contactsafe replay", arguments, description=docstring(replay))
+    if asked.torques:
+        _compare_torques(asked)
+        return
     arm = arm_of(asked.robot, asked.tool, asked.site, asked.calibration)
     log = asked.read(arm)
     folder = prepare_output(asked.out) if asked.out else None
     found = results_of(play(log, arm, wrench=asked.wrench))
     command = shlex.join(["contactsafe", "replay", *arguments])
     tell(found, asked, folder, command, (f"What touched the {arm.name}", WORDS))
+
+
+def _compare_torques(asked: Options) -> None:
+    """Compute the torques of a run again; fail where any differs."""
+    from contactsafe.hardware.recorder import is_run
+    from contactsafe.logs.robot_run import torques_again
+
+    if not asked.log.is_file() or not is_run(asked.log):
+        raise InvalidInputError(f"{asked.log} is no log of `contactsafe run`; give its run.mcap")
+    again = torques_again(asked.log)
+    if again.same < again.ticks:
+        raise InvalidInputError(
+            f"{again.verdict}; this machine or this version computes otherwise than the one it ran on"
+        )
+    print(again.verdict)
 
 
 def tell(found: Experiment, asked: LogOptions, folder: Path | None, command: str, words: tuple[str, str]) -> None:

@@ -3,7 +3,7 @@
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
@@ -109,7 +109,7 @@ def run_crew(
     return ending_of(exchange)
 
 
-def _wait_until_ready(processes: dict[str, BaseProcess], exchange: Exchange) -> None:
+def _wait_until_ready(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
     """Wait until control and policy have compiled, loaded and opened what they need."""
     board, until = exchange.board, time.monotonic() + _READY_S
     awaited = [name for name in ("control", "policy", "watchdog") if name in processes]
@@ -137,7 +137,7 @@ def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _see_off(processes: dict[str, BaseProcess], exchange: Exchange) -> None:
+def _see_off(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
     """Wait for all to end; the watchdog ends whoever does not, and this does where there is none."""
     until = time.monotonic() + 12.0
     while any(process.is_alive() for process in processes.values()) and time.monotonic() < until:

@@ -10,7 +10,7 @@ import signal
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class Recorder:
         except ImportError:
             raise InvalidInputError("mcap is not installed; run: pip install 'contactsafe[mcap]'") from None
         self.exchange, self._file = exchange, _File(path)
-        self._writer = Writer(self._file, use_chunking=False)
+        self._writer = Writer(cast(Any, self._file), use_chunking=False)
         self._writer.start(profile="ros2", library="contactsafe")
         self._writer.add_metadata(RUN, {name: str(value) for name, value in run.items()})
         self._ticks = self._channel(TICKS_TOPIC, exchange.ticks.dtype, "Tick")
@@ -154,6 +154,12 @@ def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     except InvalidInputError as error:
         board["recorder_errno"] = -1
         print(f"recorder: {error}", flush=True)
+
+
+def is_run(path: Path) -> bool:
+    """Tell whether a file is a run that `Recorder` has written."""
+    with open(path, "rb") as file:
+        return RUN.encode() in file.read(4096)
 
 
 def read_run(path: Path, dtype: np.dtype, topic: str = TICKS_TOPIC) -> tuple[dict[str, str], np.ndarray]:

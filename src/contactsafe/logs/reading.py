@@ -11,6 +11,7 @@ import numpy as np
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.logs.log import Log
 from contactsafe.logs.mcap_reading import read_mcap
+from contactsafe.logs.robot_run import run_arrays
 
 NAMES: dict[str, tuple[str, ...]] = {
     "time": ("time", "t", "timestamp", "stamp", "time_s"),
@@ -33,7 +34,8 @@ def read_log(
     """Read a log.
 
     Columns of a CSV are named by what they hold and a number, as q_0 … q_6, q1 … q7 or q[0] … q[6]; an NPZ has an array
-    (T, n) by each name. An MCAP has joint states of ROS 2, or JSON messages with an array by each name.
+    (T, n) by each name. An MCAP has joint states of ROS 2, or JSON messages with an array by each name;
+    or it is the log of `contactsafe run`.
 
     Args:
         path: of a file that ends in .csv, .npz or .mcap.
@@ -49,7 +51,11 @@ def read_log(
     for known in columns:
         if known not in NAMES:
             raise InvalidInputError(f"column {shown(known)} is nothing a log has; choose from {', '.join(NAMES)}")
-    readers = {".csv": _read_csv, ".npz": _read_npz, ".mcap": lambda path: read_mcap(path, topic, joints)}
+    readers = {
+        ".csv": _read_csv,
+        ".npz": _read_npz,
+        ".mcap": lambda path: run_arrays(path) or read_mcap(path, topic, joints),
+    }
     if path.suffix.lower() not in readers:
         raise InvalidInputError(f"{path.name} is no log that can be read; give a file that ends in .csv, .npz or .mcap")
     try:
