@@ -3,7 +3,7 @@
 import numpy as np
 
 from contactsafe.control import presets
-from contactsafe.hardware.control_process import ControlLoop, ControlSettings
+from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import publish
 from contactsafe.hardware.messages import as_words, message_dtype

@@ -102,7 +102,7 @@ def replay(arguments: Sequence[str]) -> None:
 
 def _compare_torques(asked: Options) -> None:
     """Compute the torques of a run again; fail where any differs."""
-    from contactsafe.hardware.recorder import is_run
+    from contactsafe.hardware.run_log import is_run
     from contactsafe.logs.robot_run import torques_again
 
     if not asked.log.is_file() or not is_run(asked.log):

@@ -16,14 +16,18 @@ from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
 from contactsafe.experiments.robot_run import RobotRun, robot_runs
-from contactsafe.hardware.control_process import ControlSettings, control
-from contactsafe.hardware.crew import Ending, Part, run_crew
+from contactsafe.hardware.control_loop import ControlSettings
+from contactsafe.hardware.control_process import control
+from contactsafe.hardware.crew import Part, run_crew
+from contactsafe.hardware.ending import Ending
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.franka_port import FrankaPort
 from contactsafe.hardware.recorder import record
 from contactsafe.hardware.states import REASONS, STATES
 from contactsafe.hardware.watchdog import watch
-from contactsafe.policy.robot_process import PolicySettings, Work, act_on_robot
+from contactsafe.policy.actor import PolicySettings
+from contactsafe.policy.robot_process import act_on_robot
+from contactsafe.policy.work import Work
 from contactsafe.results.experiment import to_json
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
@@ -51,8 +55,8 @@ class Options:
         rounds: of work, such as boards, after which a simulated run ends.
         speed: factor on how fast the target moves, 0.05 to 1.
         camera: serial number of the RealSense; the first one found where it is not given.
-        board: file that `contactsafe calibrate` wrote.
-        dry_run: look at robot and camera, print the checklist, move nothing.
+        dry_run: look at the robot, print the checklist, move nothing.
+        yes: do not ask before the robot moves.
         alone: nothing pushes or meets the simulated arm.
         lockstep: the simulated robot waits for each command, so that a run is the same again, however slow the machine.
         seed: of what is drawn, of light and of noise.
@@ -72,8 +76,8 @@ class Options:
     rounds: int = 3
     speed: float = 1.0
     camera: str | None = None
-    board: Path | None = None
     dry_run: bool = False
+    yes: bool = False
     alone: bool = False
     lockstep: bool = False
     seed: int = 0
@@ -138,7 +142,8 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
             said = {"robot": "fr3", "task": asked.task, "controller": controller, "seed": str(asked.seed)}
             parts = parts_of(asked, arm, bundle, simulated.work, controller, LOOPBACK, folder / LOG, said)
             ending = run_crew(exchange, parts, asked.seconds, StatusLine())
-        return RobotRun(controller, np.load(folder / TRUTH), ending, simulated.figures(), bool(simulated.scene.pushes))
+        truth = np.load(folder / TRUTH)
+        return RobotRun(controller, truth, ending, simulated.figures(truth), bool(simulated.scene.pushes))
     finally:
         exchange.unlink()
         simulated.close()

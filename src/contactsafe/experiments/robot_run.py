@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.hardware.crew import Ending
+from contactsafe.hardware.ending import Ending
 from contactsafe.results.experiment import Experiment, Table, Trial
 from contactsafe.results.figures import Figure, Panel
 from contactsafe.results.metrics import CONTACT_N, Aim, Metric

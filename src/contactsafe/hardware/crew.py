@@ -1,22 +1,27 @@
 """All processes of a run: started, told to begin once all are ready, followed, and seen off."""
 
+import math
 import multiprocessing
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 import numpy as np
 
 from contactsafe.core.errors import ContactSafeError
+from contactsafe.hardware.ending import Ending, ending_of
 from contactsafe.hardware.exchange import Exchange
-from contactsafe.hardware.states import ASKED, REASONS, STATES, STOPPED, TIME_UP, WELL
+from contactsafe.hardware.states import ASKED
 
 _READY_S = 600.0
 """The first run on a machine compiles for minutes."""
+
+_SEE_OFF_S = 12.0
+"""After so long whoever has not ended is ended."""
 
 _EVERY_S = 0.05
 
@@ -38,38 +43,6 @@ class Part:
     name: str
     target: Callable[..., None]
     arguments: tuple[Any, ...] = ()
-
-
-@dataclass
-class Ending:
-    """How a run ended.
-
-    Attributes:
-        state, reason: by name.
-        remedy: what a person is to do; empty where all went well.
-        went_well: whether it ended as it should.
-        ticks: of the control loop.
-        refused: targets that were.
-        lost: states of the robot that did not come.
-        first_step_nm, largest_step_nm: changes of a torque, in the first command and in any other.
-        busy_us: busy part of a tick: median, 99th percentile and most, µs, and ticks over 500 µs.
-        recorded: ticks in the log.
-        recorder_errno: why it ends early, 0 where it does not.
-    """
-
-    state: str
-    reason: str
-    remedy: str
-    went_well: bool
-    ticks: int
-    refused: int
-    lost: int
-    first_step_nm: float
-    largest_step_nm: float
-    busy_us: tuple[int, int, int, int]
-    recorded: int
-    recorder_errno: int = 0
-    said: list[str] = field(default_factory=list)
 
 
 def run_crew(
@@ -94,12 +67,11 @@ def run_crew(
         for process in processes.values():
             process.start()
         _wait_until_ready(processes, exchange)
+        board["last_tick"] = round(1000.0 * seconds) if math.isfinite(seconds) else 0
         board["go"] = 1
         with _asked_by_signal(exchange):
             while processes["control"].is_alive() and not board["finished"][0]:
                 board["beat_command"] += 1
-                if board["tick"][0] >= 1000.0 * seconds:
-                    exchange.ask_to_stop(TIME_UP)
                 if on_look:
                     on_look(board[0])
                 time.sleep(_EVERY_S)
@@ -139,7 +111,7 @@ def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
 
 def _see_off(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
     """Wait for all to end; the watchdog ends whoever does not, and this does where there is none."""
-    until = time.monotonic() + 12.0
+    until = time.monotonic() + _SEE_OFF_S
     while any(process.is_alive() for process in processes.values()) and time.monotonic() < until:
         exchange.board["beat_command"] += 1
         time.sleep(_EVERY_S)
@@ -148,17 +120,3 @@ def _see_off(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
             process.kill()
         process.join(1.0)
     exchange.unlink()
-
-
-def ending_of(exchange: Exchange) -> Ending:
-    """Return how a run ended."""
-    board = exchange.board[0]
-    state, reason = int(board["state"]), int(board["reason"])
-    counts = np.cumsum(board["busy"])
-    median, late, most = (int(np.searchsorted(counts, fraction * counts[-1])) for fraction in (0.5, 0.99, 1.0))
-    well = state == STOPPED and reason in WELL and board["recorder_errno"] == 0
-    return Ending(
-        STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(board["tick"]),
-        int(board["refused"]), int(board["lost"]), float(board["first_step_nm"]), float(board["largest_step_nm"]),
-        (median, late, most, int(board["busy"][500:].sum())), int(board["recorded"]), int(board["recorder_errno"]),
-    )  # fmt: skip

@@ -15,7 +15,7 @@ from contactsafe.core.linalg import dot
 from contactsafe.hardware.gate import admit, follow_state, gate_dtype
 from contactsafe.hardware.mailbox import publish, receive
 from contactsafe.hardware.messages import message_dtype, reading_dtype, seen_dtype
-from contactsafe.hardware.states import BRAKED, FAULT, HELD, RUNNING, STOPPING, WATCHDOG_SILENT
+from contactsafe.hardware.states import BRAKED, FAULT, HELD, RUNNING, STOPPING, TIME_UP, WATCHDOG_SILENT
 
 _f = np.float64
 _i = np.int64
@@ -93,6 +93,8 @@ def _wish_to_stop(loop: Record, board: Record) -> int:
         loop.watchdog, loop.watchdog_ticks = board.beat_watchdog, 0
     if board.stop == 0 and board.lockstep == 0 and loop.watchdog_ticks > WATCHDOG_TICKS:
         return WATCHDOG_SILENT
+    if board.stop == 0 and 0 < board.last_tick <= loop.tick:
+        return TIME_UP
     return board.stop
 
 

@@ -10,9 +10,9 @@ from contactsafe.control import presets
 from contactsafe.control.controller import Controller
 from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.hardware.control_process import for_robot
+from contactsafe.hardware.control_loop import for_robot
 from contactsafe.hardware.messages import row_dtype
-from contactsafe.hardware.recorder import is_run, read_run
+from contactsafe.hardware.run_log import is_run, read_run
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.tasks import task_by_name
@@ -73,17 +73,20 @@ def torques_again(path: Path) -> TorquesAgain:
     controller = Controller(_arm_of(run), for_robot(presets.by_name(run.get("controller", "safe"))))
     q = rows["measurement"]["q"][0].copy()
     controller.reset(q, np.zeros(_JOINTS))
-    record = controller.record
-    record["target"] = rows["target"][0]
-    found = np.zeros((len(rows) - 1, _JOINTS))
-    for k, row in enumerate(rows[1:]):
-        record["measurement"], record["target"] = row["measurement"], row["target"]
-        tick_at(controller._ticked, controller._index)
-        found[k] = record["output"]["torque"]
+    controller.record["target"] = rows["target"][0]
+    found = np.array([_torque(controller, row) for row in rows[1:]])
     recorded = rows["output"]["torque"][1:]
     same = (found.view(np.int64) == recorded.copy().view(np.int64)).all(axis=1)
     first = 0 if same.all() else int(rows["tick"][1:][np.argmin(same)])
     return TorquesAgain(len(same), int(same.sum()), float(np.abs(found - recorded).max(initial=0.0)), first)
+
+
+def _torque(controller: Controller, row: np.void) -> np.ndarray:
+    """Run one tick on what was recorded of it; return its torque, (n,), N m."""
+    record = controller.record
+    record["measurement"], record["target"] = row["measurement"], row["target"]
+    tick_at(controller._ticked, controller._index)
+    return record["output"]["torque"].copy()
 
 
 _ROBOTS: dict[str, Callable[..., Arm]] = {"fr3": robots.fr3, "panda": robots.panda}

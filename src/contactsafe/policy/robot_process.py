@@ -1,202 +1,17 @@
 """The policy process of a real robot: sixty times a second it looks, decides, and tells control a target."""
 
-import math
 import os
 import signal
 import time
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
 
-import numpy as np
-
-from contactsafe.control.records import controller_dtype
 from contactsafe.core.errors import ContactSafeError
-from contactsafe.hardware.exchange import STEPS, Exchange
-from contactsafe.hardware.mailbox import publish, receive
-from contactsafe.hardware.messages import as_words, message_dtype, seen_dtype
+from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.mailbox import receive
 from contactsafe.hardware.states import POLICY_DEAD, POLICY_DONE
-from contactsafe.policy.action import apply_one, look_at
-from contactsafe.policy.action_config import ActionConfig, action_limits
-from contactsafe.policy.bundle import Bundle
-from contactsafe.policy.policy import Policy
-from contactsafe.policy.rate import POLICY_RATE_HZ, ticks_of_step
-from contactsafe.robot.arm import Arm, Pose
-from contactsafe.robot.posture import POSITION_TOLERANCE, find_posture, posture_rule
-
-_TRAVEL_M_S = 0.15
-"""Of the target on its way to where the policy begins."""
-
-_ARRIVED_M = 0.01
+from contactsafe.policy.actor import Actor, PolicySettings
+from contactsafe.policy.rate import ticks_of_step
 
 _NAP_S = 0.0003
-
-_QUIET_STEPS = 6
-"""Policy steps for which the arm waits at the start before the policy is asked, at least."""
-
-
-class Work(Protocol):
-    """What a task supplies for a real robot; made in the command, used in the policy's process."""
-
-    @property
-    def start(self) -> Pose:
-        """Where the tool waits before the policy begins, and when it is done."""
-        ...
-
-    @property
-    def centre(self) -> tuple[float, float, float]:
-        """Point that the bounds of the target are about, world, m."""
-        ...
-
-    @property
-    def action(self) -> ActionConfig:
-        """How actions move the target."""
-        ...
-
-    @property
-    def homography(self) -> np.ndarray | None:
-        """Of the camera that makes the masks; None where there is none."""
-        ...
-
-    def prepare(self, arm: Arm, lockstep: bool) -> None:
-        """Open what it looks with; in the policy's process."""
-        ...
-
-    def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
-        """Return what the policy observes beside pose and target; `steps` counts from its beginning, −1 before it."""
-        ...
-
-    def is_ready(self) -> bool:
-        """Tell whether there is work to begin."""
-        ...
-
-    def is_done(self) -> bool:
-        """Tell whether the work that was begun is done."""
-        ...
-
-    def seen_with(self) -> tuple[float, int]:
-        """Return the age of the last picture, ms, and how many of its mask's pixels show something; NaN and 0."""
-        ...
-
-    def close(self) -> None:
-        """Let go of what it looks with."""
-        ...
-
-
-@dataclass(frozen=True)
-class PolicySettings:
-    """What the policy process is told.
-
-    Attributes:
-        arm: that is controlled.
-        bundle: folder of the policy.
-        work: of its task.
-        speed: factor on how fast the target moves, at most 1.
-        lockstep: the control process waits for it, so that a run is the same again.
-        rounds: of work after which it ends; 0 for no end.
-    """
-
-    arm: Arm
-    bundle: Path
-    work: Work
-    speed: float = 1.0
-    lockstep: bool = False
-    rounds: int = 0
-
-
-class _Actor:
-    """The policy and its target, between messages."""
-
-    def __init__(self, settings: PolicySettings, exchange: Exchange):
-        self.settings, self.exchange, self.work = settings, exchange, settings.work
-        n = settings.arm.n
-        bundle = Bundle.load(settings.bundle)
-        self.policy = Policy(bundle, self.work.homography)
-        config = self.work.action
-        self.limits = action_limits(config, self.work.centre)
-        self.limits.step[:6] *= settings.speed
-        self.rule = posture_rule(settings.arm)
-        self.shadow = np.zeros(1, controller_dtype(n))
-        self.pose, self.target = np.zeros(6), np.zeros(18)
-        self.stiffness, self.damping = config.stiffness_first, 2.0 * np.sqrt(config.stiffness_first)
-        self.message, self.seen = np.zeros(1, message_dtype(n)), np.zeros(1, seen_dtype(n))
-        self.message["joints"] = n
-        self.words, self.seen_words = as_words(self.message), as_words(self.seen)
-        self.steps, self.waited, self.rounds, self.action = -1, 0, 0, np.zeros(18)
-        self.done = False
-        self._warm_up()
-
-    def _warm_up(self) -> None:
-        """Run what a step runs once, so that nothing is compiled or loaded once the arm moves."""
-        self._take_over()
-        self._travel()
-        apply_one(self.shadow, 0, self.limits, self.rule, self.action)
-        publish(self.exchange.targets.copy(), self.words)
-        receive(self.exchange.seen.copy(), self.seen_words.copy())
-
-    def step(self) -> None:
-        """Look, decide, tell."""
-        began, board, number = time.perf_counter_ns(), self.exchange.board, int(self.message["number"][0])
-        self._take_over()
-        observed = self.work.look(self.seen[0], self.pose, self.steps)
-        observation = {"pose": self.pose, "target": self.target, **observed}
-        if self.steps >= 0 and self.work.is_done():
-            self.steps, self.waited, self.rounds = -1, 0, self.rounds + 1
-            self.done = self.settings.rounds > 0 and self.rounds >= self.settings.rounds
-        if self.steps < 0 and self._travel() and self.work.is_ready():
-            self.steps = 0
-            self.policy.begin()
-            observation.update(self.work.look(self.seen[0], self.pose, self.steps))
-        if self.steps >= 0:
-            self.action = self.policy.act(observation).astype(float)
-            apply_one(self.shadow, 0, self.limits, self.rule, self.action)
-            self.steps += 1
-        self._tell(number + 1)
-        board["beat_policy"] += 1
-        self._record(began, number)
-
-    def _take_over(self) -> None:
-        """Take what the control process told as it is now: where the tool is, and the target in force."""
-        shadow, seen = self.shadow[0], self.seen[0]
-        shadow["output"]["position"], shadow["output"]["rotation"] = seen["position"], seen["rotation"]
-        shadow["target"] = seen["target"]
-        look_at(self.shadow, 0, self.pose, self.target)
-
-    def _travel(self) -> bool:
-        """Move the target to the start, first up, then aside, then down; tell whether the tool has waited there."""
-        target, start = self.shadow[0]["target"], self.work.start
-        way = start.position - target["position"]
-        if way[2] > 0.0:
-            way[:2] = 0.0  # up before aside
-        elif np.any(np.abs(way[:2]) > 1e-6):
-            way[2] = 0.0  # aside before down
-        length, stride = float(np.linalg.norm(way)), _TRAVEL_M_S * self.settings.speed / POLICY_RATE_HZ
-        target["position"] += way * min(1.0, stride / max(length, 1e-9))
-        target["quat"], target["K_task"], target["D_task"] = start.quat, self.stiffness, self.damping
-        posture = np.empty(self.settings.arm.n)
-        if find_posture(self.rule, target["position"], target["quat"], posture)[0] <= POSITION_TOLERANCE:
-            target["q_posture"] = posture
-        left = math.dist(target["position"], start.position)
-        arrived = left < 1e-6 and math.dist(self.seen[0]["position"], start.position) < _ARRIVED_M
-        self.waited = self.waited + 1 if arrived else 0
-        return self.waited > _QUIET_STEPS
-
-    def _tell(self, number: int) -> None:
-        message, target = self.message[0], self.shadow[0]["target"]
-        message["number"], message["of_tick"] = number, self.seen[0]["tick"]
-        for name in ("position", "quat", "K_task", "D_task", "q_posture"):
-            message[name] = target[name]
-        publish(self.exchange.targets, self.words)
-
-    def _record(self, began: int, step: int) -> None:
-        board = self.exchange.board
-        row = self.exchange.steps[int(board["steps_written"][0]) % STEPS]
-        row["step"], row["of_tick"], row["stamp"] = step, self.seen[0]["tick"], time.time_ns()
-        row["busy_ns"] = time.perf_counter_ns() - began
-        row["frame_age_ms"], row["ink"] = self.work.seen_with()
-        row["pose"], row["force"], row["action"] = self.pose, self.seen[0]["force"], self.action
-        board["steps_written"] += 1
-        board["steps"] = step + 1
 
 
 def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
@@ -213,7 +28,7 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
     work = settings.work
     try:
         work.prepare(settings.arm, settings.lockstep)
-        actor = _Actor(settings, exchange)
+        actor = Actor(settings, exchange)
         board["ready_policy"] = 0
         board["beat_policy"] += 1
         _follow(actor, exchange)
@@ -224,7 +39,7 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
         work.close()
 
 
-def _follow(actor: _Actor, exchange: Exchange) -> None:
+def _follow(actor: Actor, exchange: Exchange) -> None:
     """Step whenever the control process has come to the tick of the next step."""
     board, step, due = exchange.board, 0, 1
     while not board["finished"][0] and not actor.done:
@@ -238,9 +53,9 @@ def _follow(actor: _Actor, exchange: Exchange) -> None:
                 return
             continue
         actor.step()
+        if actor.done:
+            exchange.ask_to_stop(POLICY_DONE)
         board["ready_policy"] = tick
         while due <= tick:  # a step that came late is left out, not made up for
             due += int(ticks_of_step(step))
             step += 1
-    if actor.done:
-        exchange.ask_to_stop(POLICY_DONE)

@@ -143,8 +143,8 @@ class SimulatedFranka:
                 select.select([protocol._FrankaServer__udp_socket, protocol._tcp_socket], [], [], _PATIENCE_S)
             self._awaits_command = True
         protocol.process_commands()
-        if self.is_controlled and not self.begun:
-            self.begun = self._is_commanded
+        if not self.begun:
+            self.begun = self.is_controlled and self._is_commanded
             if not self.begun:
                 self._freeze()
         if self.begun:

@@ -1,11 +1,13 @@
 """What a task supplies to be run on a real robot, and on a simulated one over the robot's own network protocol."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from contactsafe.policy.robot_process import Work
+import numpy as np
+
+from contactsafe.policy.work import Work
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.description import Tool
 from contactsafe.sim.franka_meetings import bottle_in_the_way, pushes
@@ -21,14 +23,15 @@ class Simulated:
         scene: about the robot.
         effect: of the tool on it.
         work: of the policy.
-        figures: what was achieved, by name, after the run.
+        figures: what was achieved, by name, after the run, of what really happened, `truth_dtype` records; names that
+            begin with "done" are fractions of the work.
         close: removes what it left.
     """
 
     scene: FrankaScene
     effect: Effect | None
     work: Work
-    figures: Callable[[], dict[str, float]] = field(default=dict)
+    figures: Callable[[np.ndarray], dict[str, float]] = lambda truth: {}
     close: Callable[[], None] = lambda: None
 
 

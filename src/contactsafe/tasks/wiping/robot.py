@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.franka import WIPER
 from contactsafe.sim.fixtures import TipSurface, workbench
@@ -11,7 +13,7 @@ from contactsafe.sim.franka_scene import FrankaScene
 from contactsafe.tasks.base.robot import Simulated, met_by
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
-from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard
+from contactsafe.tasks.wiping.robot_pictures import CameraPictures, PhotographedBoard
 from contactsafe.tasks.wiping.robot_work import WipingWork
 
 
@@ -21,9 +23,10 @@ class WipingRobot:
     tool = WIPER
 
     def work(self, **looks: Any) -> WipingWork:
-        """Return the work, with the pictures that it looks at."""
+        """Return the work, with the pictures that it looks at, or those of the camera of a serial number."""
         config = WipingConfig()
-        return WipingWork(looks["pictures"], config.board, config.camera, config.action)
+        pictures = looks.get("pictures") or CameraPictures(looks.get("camera"), config.camera)
+        return WipingWork(pictures, config.board, config.camera, config.action)
 
     def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
         """Return a run before boards of random strokes, seen in photographs."""
@@ -36,7 +39,8 @@ class WipingRobot:
         scene = FrankaScene(self.tool, TipSurface(friction=board.friction), (workbench(board.centre, board.size),))
         shown = map_shown(path, board)
 
-        def figures() -> dict[str, float]:
+        def figures(truth: np.ndarray) -> dict[str, float]:
+            del truth
             started, left = shown["ink_start"][0][:rounds], shown["ink"][0][:rounds]
             drawn = started > 0
             gone = 1.0 - left[drawn] / started[drawn]

@@ -1,22 +1,71 @@
-"""Pictures of the board of a simulated robot, taken as a camera would: late, noisy, under uneven light."""
+"""Pictures of the board for a robot: from a RealSense, or from one made of software before a simulated board."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
+from contactsafe.hardware.realsense import HEIGHT, WIDTH, ColourCamera, SoftwareCamera
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
-from contactsafe.tasks.wiping.photograph import Photographer
+from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
 from contactsafe.tasks.wiping.robot_board import map_shown
+from contactsafe.vision.lens import Distorted, Lens, Square
+
+D455 = Lens(WIDTH, HEIGHT, 639.0, 639.0, 639.5, 359.5, (-0.056, 0.065, 0.0, 0.0, 0.0))
+"""Colour pictures of a RealSense D455; three units read from 632 to 646 pixels of focal length, k1 −0.056, k2 0.065."""
 
 _EVERY_TICKS = 33
 """Thirty pictures a second."""
 
+_WAIT_MS = 200
+
+
+def focal_px(camera: Camera) -> float:
+    """Return the focal length of a photograph, pixels, of the camera that a policy was trained with."""
+    return camera.focal_px * PHOTO_PX / camera.size
+
+
+class CameraPictures:
+    """Photographs of a RealSense camera that stands where the policy's camera was in training.
+
+    Args:
+        serial: of the camera; None for the first one.
+        camera: that the policy was trained with.
+    """
+
+    def __init__(self, serial: str | None, camera: Camera):
+        self._serial, self._camera = serial, camera
+
+    def open(self) -> None:
+        """Open it, and take over what its device knows of its lens."""
+        self._source = ColourCamera(self._serial)
+        self._source.open()
+        lens = self._source.intrinsics
+        known = Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, tuple(lens.coeffs))
+        self._square = Square(known, PHOTO_PX, focal_px(self._camera))
+        self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
+
+    def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
+        """Return the newest photograph; one that is gone is looked for again."""
+        del tick
+        picture, number, age_ms = self._source.newest()
+        if picture is None or age_ms > _WAIT_MS:
+            self._source.look_again()
+            return self._photo, self._number, math.inf if picture is None else age_ms
+        if number != self._number:
+            self._photo, self._number = self._square.cut(picture), number
+        return self._photo, number, age_ms
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._source.close()
+
 
 class PhotographedBoard:
-    """A photographer before the board of `WipedBoard`.
+    """A D455 made of software before the board of `WipedBoard`, read by the code that reads a real one.
 
     Args:
         path: of what the board shows.
@@ -29,19 +78,29 @@ class PhotographedBoard:
         self._path, self._arm, self._board, self._camera, self._seed = path, arm, board, camera, seed
 
     def open(self) -> None:
-        """Map what the board shows."""
+        """Map what the board shows, and start the camera."""
         self._shown = map_shown(self._path, self._board)
         self._photographer = Photographer(self._camera, self._board, build_plant(self._arm, WorldConfig(fixtures=())))
-        self._picture, self._number = np.zeros((1, 1, 3), np.uint8), -1
+        self._square = Square(D455, PHOTO_PX, focal_px(self._camera))
+        self._distorted = Distorted(self._square)
+        self._device = SoftwareCamera(D455.fx, D455.fy, D455.cx, D455.cy, D455.distortion)
+        self._source = ColourCamera(sensor=self._device.sensor, profile=self._device.profile)
+        self._source.open()
+        self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
 
     def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
-        """Take a picture where the time for one has come."""
+        """Take a picture where the time for one has come, and return the newest."""
         number = tick // _EVERY_TICKS
         if number != self._number:
-            self._number, shown = number, self._shown[0]
+            shown = self._shown[0]
             solids = self._photographer.solids_at(shown["q"].copy())
-            self._picture = self._photographer.take(shown["cells"], solids, self._seed, number)
-        return self._picture, number, float(tick - number * _EVERY_TICKS)
+            photograph = self._photographer.take(shown["cells"], solids, self._seed, number)
+            self._device.give(self._distorted.picture(photograph), number, 1000.0 * number / 30.0)
+            picture, self._number, _ = self._source.newest(_WAIT_MS)
+            if picture is not None:
+                self._photo = self._square.cut(picture)
+        return self._photo, self._number, float(tick - number * _EVERY_TICKS)
 
     def close(self) -> None:
-        """Nothing is to be let go of."""
+        """Stop the camera."""
+        self._source.close()

@@ -20,6 +20,9 @@ _START_M = 0.06
 _CLEAN_LOOKS, _INKED_LOOKS = 20, 6
 """New pictures in a row without ink after which a board is clean, and with ink after which there is work."""
 
+_BLIND_MS = 150.0
+"""The arm is held where the newest picture is older: it has stopped, or the camera is unplugged."""
+
 _LEAST_PX = 3
 """A mask of fewer inked pixels shows none."""
 
@@ -65,6 +68,11 @@ class WipingWork:
         return Pose(np.add(self.board.centre, [0.0, 0.0, _START_M]), DOWN)
 
     @property
+    def travel_m_s(self) -> float:
+        """As fast as a person would put a hand there."""
+        return 0.15
+
+    @property
     def homography(self) -> np.ndarray:
         """Of the masks."""
         from contactsafe.tasks.wiping.camera import plane_homography
@@ -92,6 +100,10 @@ class WipingWork:
             self._clean = 0 if shows else self._clean + 1
             self._inked = self._inked + 1 if shows else 0
         return {"mask": self._mask[..., None], "force": np.asarray(seen["force"])}
+
+    def is_blind(self) -> bool:
+        """Tell whether the camera shows what is past."""
+        return self._age_ms > _BLIND_MS
 
     def is_ready(self) -> bool:
         """Tell whether ink is seen."""

@@ -1,0 +1,96 @@
+"""A real camera's lens: from its picture to the undistorted square about the board, and back for a synthetic one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.vision.opencv import cv2
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A pinhole with distortion, as OpenCV and librealsense have it (Brown, Conrady).
+
+    Attributes:
+        width, height: of the picture, pixels.
+        fx, fy, cx, cy: focal lengths and principal point, pixels; the middle of pixel (0, 0) is (0, 0).
+        distortion: k1, k2, p1, p2, k3.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no lens."""
+        numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion)
+        if min(self.width, self.height) < 16 or min(self.fx, self.fy) <= 0.0 or not np.isfinite(numbers).all():
+            raise InvalidInputError(
+                f"lens {self.width} × {self.height}, fx = {self.fx}, fy = {self.fy}; give 16 pixels or more, focal "
+                "lengths above 0, finite numbers"
+            )
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """OpenCV's camera matrix, (3, 3)."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+
+class Square:
+    """The undistorted square of a camera's picture that a photograph is.
+
+    Args:
+        lens: of the camera.
+        size: pixels along an edge of the photograph.
+        focal_px: its focal length, pixels.
+    """
+
+    def __init__(self, lens: Lens, size: int, focal_px: float):
+        self.lens, self.size = lens, size
+        middle = (size - 1) / 2.0
+        self._matrix = np.array([[focal_px, 0.0, middle], [0.0, focal_px, middle], [0.0, 0.0, 1.0]])
+        distortion = np.array(lens.distortion)
+        self._maps = cv2.initUndistortRectifyMap(
+            lens.matrix, distortion, np.eye(3), self._matrix, (size, size), cv2.CV_32FC1
+        )
+
+    def cut(self, picture: np.ndarray) -> np.ndarray:
+        """Return the photograph, uint8 (size, size, 3), of a camera's picture, uint8 (height, width, 3).
+
+        Raises:
+            InvalidInputError: the picture has another shape or type.
+        """
+        picture = np.asarray(picture)
+        if picture.shape != (self.lens.height, self.lens.width, 3) or picture.dtype != np.uint8:
+            raise InvalidInputError(
+                f"picture is {picture.dtype} of shape {picture.shape}; give uint8 "
+                f"({self.lens.height}, {self.lens.width}, 3)"
+            )
+        return cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+
+class Distorted:
+    """What a camera with a lens makes of a photograph: the synthetic counterpart of `Square`.
+
+    Args:
+        square: that the photograph is.
+    """
+
+    def __init__(self, square: Square):
+        lens = square.lens
+        columns, rows = np.meshgrid(np.arange(lens.width, dtype=np.float32), np.arange(lens.height, dtype=np.float32))
+        seen = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
+        straight = cv2.undistortPoints(seen, lens.matrix, np.array(lens.distortion), P=square._matrix)[:, 0]
+        shape = (lens.height, lens.width)
+        self._maps = straight[:, 0].reshape(shape).astype(np.float32), straight[:, 1].reshape(shape).astype(np.float32)
+
+    def picture(self, photograph: np.ndarray) -> np.ndarray:
+        """Return the camera's picture, uint8 (height, width, 3); grey where the photograph does not reach."""
+        return cv2.remap(
+            photograph, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(90, 90, 90)
+        )

@@ -1,0 +1,63 @@
+"""Processes that come, work and go: what is said of how a run ended."""
+
+import numpy as np
+import pytest
+
+from contactsafe.hardware import crew, states
+from contactsafe.hardware.crew import Part, RunError, run_crew
+from contactsafe.hardware.ending import ending_of
+from contactsafe.hardware.exchange import Exchange
+from tests.hardware import crew_parts
+
+
+@pytest.fixture
+def exchange():
+    made = Exchange.create(7)
+    yield made
+    made.unlink()
+
+
+@pytest.mark.parametrize(("state", "reason", "errno", "well"), [
+    (states.STOPPED, states.TIME_UP, 0, True),
+    (states.STOPPED, states.ASKED, 0, True),
+    (states.STOPPED, states.POLICY_DONE, 0, True),
+    (states.STOPPED, states.POLICY_SILENT, 0, False),
+    (states.FAULT, states.ROBOT_FAULT, 0, False),
+    (states.STOPPED, states.TIME_UP, 28, False),
+])  # fmt: skip
+def test_a_run_went_well_where_it_stopped_for_a_good_reason_and_was_recorded(exchange, state, reason, errno, well):
+    exchange.board["state"], exchange.board["reason"], exchange.board["recorder_errno"] = state, reason, errno
+    ending = ending_of(exchange)
+    assert ending.went_well is well
+    assert (ending.state, ending.reason) == (states.STATES[state], states.REASONS[reason].name)
+    assert bool(ending.remedy) is not well
+
+
+def test_the_busy_time_is_told_by_its_distribution(exchange):
+    exchange.board["busy"][0, [30, 100, 700]] = [980, 15, 5]
+    assert ending_of(exchange).busy_us == (30, 100, 700, 5)
+
+
+def test_a_run_in_which_all_do_their_part_ends_well_and_leaves_nothing(exchange):
+    looks = []
+    parts = [Part("control", crew_parts.control), Part("policy", crew_parts.policy), Part("watchdog", crew_parts.dog)]
+    ending = run_crew(exchange, parts, 0.3, lambda board: looks.append(int(board["tick"])))
+    assert ending.went_well
+    assert ending.reason == "time is up"
+    assert looks
+    assert not exchange.path.exists()
+
+
+def test_a_part_that_does_not_get_ready_is_named_and_the_others_end(exchange):
+    parts = [Part("control", crew_parts.control), Part("policy", crew_parts.fails), Part("watchdog", crew_parts.dog)]
+    with pytest.raises(RunError, match="policy process did not get ready"):
+        run_crew(exchange, parts, 1.0)
+    assert not exchange.path.exists()
+
+
+def test_who_does_not_end_is_ended(exchange, monkeypatch):
+    monkeypatch.setattr(crew, "_SEE_OFF_S", 0.5)
+    parts = [Part("control", crew_parts.control), Part("policy", crew_parts.stays)]
+    ending = run_crew(exchange, parts, 0.2)
+    assert ending.state == "stopped"
+    assert np.isfinite(ending.largest_step_nm)

@@ -1,0 +1,146 @@
+"""Wiping on a robot: a board whose ink vanishes, seen through a D455's lens by librealsense's own sensor interface."""
+
+import math
+
+import numpy as np
+import pytest
+
+from contactsafe.hardware.messages import seen_dtype
+from contactsafe.robot import robots
+from contactsafe.tasks.wiping.board import BoardConfig, Camera, pad_half
+from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
+
+pytest.importorskip("cv2")
+pytest.importorskip("pyrealsense2")
+
+from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard
+from contactsafe.tasks.wiping.robot_work import WipingWork
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return robots.fr3()
+
+
+@pytest.fixture
+def shown(tmp_path):
+    create_shown(tmp_path / "board", BoardConfig())
+    return tmp_path / "board"
+
+
+def board_of(shown, arm, rounds=2, first_s=0.0):
+    made = WipedBoard(shown, BoardConfig(), pad_half(arm), "strokes", 4, rounds, first_s)
+    made.begin(None)
+    return made
+
+
+def wipe_all(board, z=0.01):
+    """Move the pad over all of the board, pressed."""
+    for x in np.arange(0.3, 0.7, 0.04):
+        for y in np.arange(-0.25, 0.26, 0.03):
+            board.after_step(0, np.zeros(7), np.array([x, y, z]), np.eye(3), 5.0)
+
+
+def test_ink_goes_under_a_pressed_pad_alone_and_somebody_draws_once_the_arm_is_away(shown, arm):
+    board, known = board_of(shown, arm), map_shown(shown, BoardConfig())[0]
+    board.after_step(0, np.zeros(7), np.array([0.5, 0.0, 0.2]), np.eye(3), 0.0)
+    drawn = int(known["ink_start"][0])
+    assert known["ink"][0] == drawn > 100
+    for x in (0.4, 0.5, 0.6):
+        board.after_step(8, np.zeros(7), np.array([x, 0.0, 0.012]), np.eye(3), 0.1)  # too lightly
+    assert known["ink"][0] == drawn
+    wipe_all(board)
+    assert known["ink"][0] == 0
+    for tick in range(400):
+        board.after_step(tick, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+    assert known["number"] == 0
+    for tick in range(200):
+        board.after_step(tick, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+    assert known["number"] == 1
+    assert known["ink"][1] > 100
+    wipe_all(board)
+    for tick in range(700):
+        board.after_step(tick, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+    assert known["number"] == 1  # nobody draws a third one
+
+
+def test_the_first_board_is_drawn_when_it_is_to_be(shown, arm):
+    board, known = board_of(shown, arm, first_s=1.0), map_shown(shown, BoardConfig())[0]
+    board.after_step(999, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+    assert known["number"] == -1
+    board.after_step(1000, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+    assert known["number"] == 0
+
+
+def test_what_the_camera_shows_becomes_the_mask_that_training_had(shown, arm):
+    """Through lens, sensor interface, undistortion and segmentation: the pixels of ink are those of the board."""
+    from contactsafe.sim.config import WorldConfig
+    from contactsafe.sim.scene import build_plant
+    from contactsafe.tasks.wiping.camera import plane_homography
+    from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard
+
+    board, known = board_of(shown, arm), map_shown(shown, BoardConfig())[0]
+    board.after_step(0, arm.home, np.array([0.3, 0.0, 0.4]), np.eye(3), 0.0)
+    work = WipingWork(PhotographedBoard(shown, arm, BoardConfig(), Camera(), 2))
+    work.prepare(arm, True)
+    seen = np.zeros(1, seen_dtype(7))[0]
+    seen["q"], seen["tick"] = arm.home, 40
+    mask = work.look(seen, np.zeros(6), 0)["mask"][..., 0]
+    work.close()
+    rows, columns = np.nonzero(known["cells"] == INK)
+    origin, cell = Whiteboard(BoardConfig()).origin, BoardConfig().cell
+    points = np.stack([origin[0] + (rows + 0.5) * cell, origin[1] + (columns + 0.5) * cell, np.ones(len(rows))])
+    u, v, w = plane_homography(Camera(), BoardConfig().centre[2]) @ points
+    truth = np.zeros((128, 128), bool)
+    truth[(v / w).astype(int), (u / w).astype(int)] = True
+    found = mask == 0
+    assert (found & truth).sum() > 0.9 * truth.sum()
+    around = np.zeros_like(truth)
+    for dv in (-1, 0, 1):
+        for du in (-1, 0, 1):
+            around |= np.roll(truth, (dv, du), (0, 1))
+    assert (found & ~around).sum() == 0
+    assert build_plant(arm, WorldConfig(fixtures=())).ngeom > 0
+
+
+class Shown:
+    """Pictures that the test gives."""
+
+    def __init__(self, photo):
+        self.photo, self.number, self.age_ms = photo, 0, 0.0
+
+    def open(self):
+        pass
+
+    def latest(self, tick):
+        return self.photo, self.number, self.age_ms
+
+    def close(self):
+        pass
+
+
+def test_work_begins_with_ink_ends_without_and_needs_sight(arm):
+    white = np.full((455, 455, 3), 220, np.uint8)
+    inked = white.copy()
+    inked[200:206, 150:300] = 20
+    pictures = Shown(white)
+    work = WipingWork(pictures)
+    work.prepare(arm, False)
+    seen = np.zeros(1, seen_dtype(7))[0]
+    seen["q"] = arm.home
+
+    def look(photo, times):
+        for _ in range(times):
+            pictures.photo, pictures.number = photo, pictures.number + 1
+            work.look(seen, np.zeros(6), 0)
+
+    look(white, 30)
+    assert work.is_done()
+    assert not work.is_ready()
+    look(inked, 10)
+    assert work.is_ready()
+    assert not work.is_done()
+    assert not work.is_blind()
+    pictures.age_ms = math.inf
+    work.look(seen, np.zeros(6), 0)
+    assert work.is_blind()
