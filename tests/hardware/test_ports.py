@@ -75,9 +75,12 @@ def test_a_reading_is_filled_by_value():
         time=SimpleNamespace(to_sec=lambda: 1.2340000001), q=[0.1] * 7, dq=[0.2] * 7, tau_J=[0.3] * 7,
         tau_J_d=[0.4] * 7, control_command_success_rate=0.97, robot_mode=2,
     )  # fmt: skip
-    reading = np.zeros(1, reading_dtype(7))
-    franka_port.FrankaPort("127.0.0.1")._fill(reading, state)
-    assert reading["time"][0] == 1.234
+    reading, port = np.zeros(1, reading_dtype(7)), franka_port.FrankaPort("127.0.0.1")
+    port._fill(reading, state)
+    assert reading["time"][0] == 0.0
+    state.time.to_sec = lambda: 1.2360000001
+    port._fill(reading, state)
+    assert reading["time"][0] == 0.002
     assert (reading["torque"][0] == 0.3).all()
     assert (reading["commanded"][0] == 0.4).all()
     assert reading["mode"][0] == 2

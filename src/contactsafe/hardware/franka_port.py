@@ -44,6 +44,7 @@ class FrankaPort:
         self._control: Any = None
         self._into: dict[str, np.ndarray] = {}
         self._filled: np.ndarray | None = None
+        self._first_ms: int | None = None
         self.torque_rate = np.full(7, _RATE_NM)
 
     @property
@@ -66,7 +67,8 @@ class FrankaPort:
             self._fill(reading, self._robot.read_once())
 
     def begin(self) -> None:
-        """Take control."""
+        """Take control; its time begins with the first state."""
+        self._first_ms = None
         with _named(self._library):
             self._control = self._robot.start_torque_control()
 
@@ -83,7 +85,10 @@ class FrankaPort:
             self._filled = reading
             self._into = {name: reading[name].reshape(-1) for name in reading.dtype.names or ()}
         into = self._into
-        into["time"][0] = round(1000.0 * state.time.to_sec()) / 1000.0
+        milliseconds = round(1000.0 * state.time.to_sec())
+        if self._first_ms is None:
+            self._first_ms = milliseconds
+        into["time"][0] = (milliseconds - self._first_ms) / 1000.0  # since control began: the same in every run
         into["q"][:], into["qd"][:] = state.q, state.dq
         into["torque"][:], into["commanded"][:] = state.tau_J, state.tau_J_d
         into["success_rate"][0], into["mode"][0] = state.control_command_success_rate, int(state.robot_mode)

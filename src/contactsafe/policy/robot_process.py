@@ -49,8 +49,6 @@ def _follow(actor: Actor, exchange: Exchange) -> None:
             if sequence > 0:
                 board["ready_policy"] = tick
             time.sleep(0 if actor.settings.lockstep and sequence > 0 else _NAP_S)
-            if board["stop"][0] and board["finished"][0]:
-                return
             continue
         actor.step()
         if actor.done:
