@@ -1,9 +1,14 @@
 """Processes for `test_crew`: each does as little of its part as a run needs."""
 
+import os
 import signal
 import time
 
+import numpy as np
+
 from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.mailbox import publish, receive
+from contactsafe.hardware.messages import as_words, message_dtype, seen_dtype
 from contactsafe.hardware.states import RUNNING, STOPPED, TIME_UP
 
 
@@ -51,3 +56,21 @@ def stays(path):
     exchange = Exchange(path)
     exchange.board["beat_policy"] += 1
     time.sleep(60.0)
+
+
+def holder(path, position, quat, posture):
+    """Ask for one pose at every tick, tick by tick, as a policy in lockstep does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    exchange = Exchange(path)
+    board, seen, message = exchange.board, np.zeros(1, seen_dtype(7)), np.zeros(1, message_dtype(7))
+    board["pid_policy"] = os.getpid()
+    row = message[0]
+    row["position"], row["quat"], row["q_posture"], row["joints"] = position, quat, posture, 7
+    row["K_task"], row["D_task"] = [150.0] * 3 + [450.0] * 3, [24.0] * 3 + [42.0] * 3
+    board["beat_policy"] += 1
+    while not board["finished"][0]:
+        if receive(exchange.seen, as_words(seen)) > 0 and seen["tick"][0] > row["of_tick"]:
+            row["number"], row["of_tick"] = row["number"] + 1, seen["tick"][0]
+            publish(exchange.targets, as_words(message))
+            board["ready_policy"] = row["of_tick"]
+        time.sleep(0)

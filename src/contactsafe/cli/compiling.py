@@ -4,23 +4,32 @@ import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from contactsafe.control.contact_estimator import ContactEstimator
 from contactsafe.control.controller import Controller
+from contactsafe.control.presets import safe
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
+from contactsafe.hardware.exchange import Exchange
 from contactsafe.policy.action_config import ACTION_SIZE
+from contactsafe.policy.actor import Actor, PolicySettings
 from contactsafe.policy.bundle import shipped_bundle
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.arm import Arm, arm_from_description
+from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import HAND
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.robots import panda
+from contactsafe.robot.robots import fr3, panda
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks import DEFAULT_TASK, TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.task import Task
+from contactsafe.tasks.insertion.config import InsertionConfig
+from contactsafe.tasks.insertion.robot import InsertionWork
+from contactsafe.tasks.insertion.scene import PEG
 from contactsafe.vision.rectify import rectify
 
 MOST_JOINTS = 14
@@ -45,7 +54,7 @@ def steps(joints: Sequence[str] = ("7",)) -> dict[str, Callable[[], object]]:
     found["worlds"] = _run_worlds
     for name in TASKS:
         found |= {f"{name}{what}": run for what, run in _of_task(task_by_name(name)).items()}
-    return found | {"policy and encoder": _see}
+    return found | {"policy and encoder": _see, "control loop and policy of a real robot": _drive}
 
 
 def _of_task(task: Task) -> dict[str, Callable[[], object]]:
@@ -84,6 +93,19 @@ def _run_worlds() -> None:
     worlds = Worlds(panda())
     worlds.reset(0, worlds.arm.home)
     worlds.run(1)
+
+
+def _drive() -> None:
+    """Make both for a robot that is none; they run once without driving anything."""
+    exchange, work = Exchange.create(len(FR3.links)), InsertionWork(InsertionConfig())
+    arm = fr3(PEG)
+    try:
+        nothing: Any = SimpleNamespace(torque_rate=np.ones(arm.n))
+        ControlLoop(ControlSettings(arm, safe(), nothing), exchange)
+        work.prepare(arm, lockstep=True)
+        Actor(PolicySettings(arm, shipped_bundle("insertion"), work), exchange)
+    finally:
+        exchange.unlink()
 
 
 def _see() -> None:

@@ -42,7 +42,7 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
 def _follow(actor: Actor, exchange: Exchange) -> None:
     """Step whenever the control process has come to the tick of the next step."""
     board, step, due = exchange.board, 0, 1
-    while not board["finished"][0] and not actor.done:
+    while not board["finished"][0]:
         sequence = receive(exchange.seen, actor.seen_words)
         tick = int(actor.seen["tick"][0]) if sequence > 0 else 0
         if tick < due:
@@ -53,6 +53,8 @@ def _follow(actor: Actor, exchange: Exchange) -> None:
         actor.step()
         if actor.done:
             exchange.ask_to_stop(POLICY_DONE)
+            board["ready_policy"] = tick
+            return
         board["ready_policy"] = tick
         while due <= tick:  # a step that came late is left out, not made up for
             due += int(ticks_of_step(step))

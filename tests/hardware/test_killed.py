@@ -1,0 +1,111 @@
+"""Processes that are killed or frozen in the middle of a run over the protocol: it ends by name, and nothing is left.
+
+In lockstep, so that a busy machine is no fault.
+"""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from contactsafe.control import presets
+from contactsafe.hardware import states
+from contactsafe.hardware.control_loop import ControlSettings
+from contactsafe.hardware.control_process import control
+from contactsafe.hardware.crew import Part, run_crew
+from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.franka_port import FrankaPort
+from contactsafe.hardware.messages import row_dtype
+from contactsafe.hardware.realtime import Realtime
+from contactsafe.hardware.recorder import record
+from contactsafe.hardware.run_log import read_run
+from contactsafe.hardware.watchdog import watch
+from contactsafe.robot import robots
+from contactsafe.sim.franka_process import SimulatedRobot
+from contactsafe.sim.franka_scene import FrankaScene
+from tests.hardware import crew_parts
+
+pytest.importorskip("pylibfranka")
+pytest.importorskip("franky_sim")
+
+pytestmark = pytest.mark.slow
+
+
+def alive(pid):
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+class Run:
+    """A run that holds an arm, in which something happens after half a second."""
+
+    def __init__(self, folder):
+        self.arm, self.folder = robots.fr3(), folder
+        self.exchange, self.happened = Exchange.create(7), False
+        self.exchange.board["lockstep"] = 1
+        settings = ControlSettings(
+            self.arm, presets.safe(), FrankaPort("127.0.0.1"), lockstep=True, rights=Realtime(0, -1, False)
+        )
+        pose = self.arm.tool_pose(self.arm.home)
+        self.parts = [
+            Part("watchdog", watch),
+            Part("recorder", record, (folder / "run.mcap", {"robot": "fr3", "task": "wiping"})),
+            Part("control", control, (settings,)),
+            Part("policy", crew_parts.holder, (pose.position, pose.quat, self.arm.home)),
+        ]
+
+    def go(self, happen, seconds=3.0):
+        """Run, and let it happen once; return how it ended and the processes' numbers."""
+        pids = {}
+
+        def look(board):
+            if board["tick"] > 500 and not self.happened:
+                self.happened = True
+                pids.update({name: int(board[f"pid_{name}"]) for name in ("control", "policy", "recorder", "watchdog")})
+                happen(pids, self.robot.process.pid)
+
+        self.robot = SimulatedRobot(FrankaScene(robots.WIPER), self.arm.home, lockstep=True)
+        with self.robot:
+            ending = run_crew(self.exchange, self.parts, seconds, look)
+            if self.robot.process.is_alive():
+                os.kill(self.robot.process.pid, signal.SIGCONT)
+        return ending, pids
+
+
+def kill(name):
+    return lambda pids, robot: os.kill(pids[name], signal.SIGKILL)
+
+
+EVENTS = {
+    "control killed": (kill("control"), "fault", {"control ended"}),
+    "policy killed": (kill("policy"), "stopped", {"policy ended", "policy silent"}),
+    "simulator killed": (lambda pids, robot: os.kill(robot, signal.SIGKILL), "fault", {"robot silent", "robot fault"}),
+    "simulator frozen": (lambda pids, robot: os.kill(robot, signal.SIGSTOP), "fault", {"robot silent"}),
+    "recorder killed": (kill("recorder"), "stopped", {"time is up"}),
+    "watchdog killed": (kill("watchdog"), "stopped", {"time is up"}),
+    "Ctrl-C": (lambda pids, robot: os.kill(os.getpid(), signal.SIGINT), "stopped", {"asked to stop"}),
+}
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_it_ends_by_name_and_nothing_is_left(event, tmp_path):
+    happen, state, reasons = EVENTS[event]
+    run = Run(tmp_path)
+    ending, pids = run.go(happen)
+    assert (ending.state, ending.reason in reasons) == (state, True), ending
+    assert not [name for name, pid in pids.items() if alive(pid)]
+    assert not run.exchange.path.exists()
+    assert ending.largest_step_nm <= 0.9 + 1e-9
+
+
+def test_what_a_recorder_wrote_before_it_was_killed_is_read(tmp_path):
+    run = Run(tmp_path)
+    ending, _ = run.go(kill("recorder"), seconds=2.0)
+    _, rows = read_run(tmp_path / "run.mcap", row_dtype(7))
+    assert len(rows) > 450
+    assert (np.diff(rows["tick"]) == 1).all()
+    assert ending.reason == states.REASONS[states.TIME_UP].name
