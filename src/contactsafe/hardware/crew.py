@@ -17,7 +17,7 @@ from contactsafe.hardware.ending import Ending, ending_of
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.states import ASKED
 
-_READY_S = 600.0
+_READY_S = 1800.0
 """The first run on a machine compiles for minutes."""
 
 _SEE_OFF_S = 12.0

@@ -12,7 +12,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.franka_scene import FrankaScene
 from contactsafe.sim.franka_server import Effect, serve
 
-_READY_S = 60.0
+_READY_S = 900.0
 
 
 class SimulatedRobot:
