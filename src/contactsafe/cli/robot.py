@@ -28,6 +28,9 @@ from contactsafe.hardware.watchdog import watch
 from contactsafe.policy.actor import PolicySettings
 from contactsafe.policy.robot_process import act_on_robot
 from contactsafe.policy.work import Work
+from contactsafe.report import terminal_table, write_report
+from contactsafe.report.data import Words
+from contactsafe.report.summary import summarise
 from contactsafe.results.experiment import to_json
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
@@ -38,6 +41,14 @@ LOOPBACK = "127.0.0.1"
 """Where the simulated robot listens, and nowhere else."""
 
 LOG, TRUTH = "run.mcap", "truth.npy"
+
+WORDS = Words(
+    "contactsafe: a run over the robot's protocol",
+    "A policy at work on a simulated Franka",
+    "Control loop, policy, recorder and watchdog each ran in a process of their own, against a simulated robot that "
+    "speaks a Franka's own network protocol. Whatever the page shows of forces really acted; none of them was measured.",
+    "The robot is franky-sim's FR3, its joint torque measured behind the gears, most of its motors' friction taken off.",
+)
 
 
 @dataclass(frozen=True)
@@ -207,11 +218,8 @@ class StatusLine:
 
 def _show(asked: Options, runs: Sequence[RobotRun]) -> None:
     """Print the figures, write the page, and fail where a run did not end as it should."""
-    from contactsafe.report import terminal_table, write_report
-    from contactsafe.report.summary import summarise
-
     results, info = [robot_runs(runs, asked.seed)], {"seeds": [asked.seed], "command": "contactsafe run --simulated"}
-    page = write_report(asked.out, results, info)
+    page = write_report(asked.out, results, info, WORDS)
     print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
     print(f"report: {page}", file=sys.stderr)
     for one in runs:
