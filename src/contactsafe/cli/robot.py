@@ -46,8 +46,8 @@ WORDS = Words(
     "contactsafe: a run over the robot's protocol",
     "A policy at work on a simulated Franka",
     "Control loop, policy, recorder and watchdog each ran in a process of their own, against a simulated robot that "
-    "speaks a Franka's own network protocol. Whatever the page shows of forces really acted; none of them was measured.",
-    "The robot is franky-sim's FR3, its joint torque measured behind the gears, most of its motors' friction taken off.",
+    "speaks a Franka's own network protocol. The forces shown really acted; none of them was measured.",
+    "The robot is franky-sim's FR3; joint torque is measured behind the gears, most of the friction there taken off.",
 )
 
 
