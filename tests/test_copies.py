@@ -394,8 +394,16 @@ def is_plain(kind):
     )
 
 
+HANDED_OVER = {
+    "FrankaPort", "InsertionRobot", "InsertionWork", "MovedBlock", "WipingRobot", "WipedBoard", "CameraPictures",
+    "PhotographedBoard", "Square", "Distorted",
+}  # fmt: skip
+"""What a run hands to its processes before any of it begins, pickled: `tests/hardware` has runs. Until then it is a
+plain record of what it was made of; the lenses are arrays."""
+
+
 def test_every_public_class_has_an_entry():
-    known = {*ACTORS, *NETWORKS, *BASES, "Call"}  # the last is how a model file is read
+    known = {*HANDED_OVER, *ACTORS, *NETWORKS, *BASES, "Call"}  # the last is how a model file is read
     missing = [
         name for name, kind in public_classes() if not (name in known or is_plain(kind) or issubclass(kind, Unique))
     ]

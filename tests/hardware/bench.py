@@ -83,8 +83,8 @@ class Bench:
         self.pose, self.speaks, self.states, self.speeds = self.arm.tool_pose(self.arm.home), True, [], []
 
     @property
-    def board(self):
-        return self.exchange.board[0]
+    def status(self):
+        return self.exchange.status[0]
 
     def tell(self, tick, **changes):
         """Publish a good target made of a tick's state, but for some changes."""
@@ -97,12 +97,12 @@ class Bench:
         publish(self.exchange.targets, self.words)
 
     def _tick(self, each, tick):
-        board = self.exchange.board
-        board["beat_watchdog"] += 1
-        self.states.append((int(board["state"][0]), int(board["reason"][0])))
-        self.speeds.append(float(board["tool_speed"][0]))
+        status = self.exchange.status
+        status["beat_watchdog"] += 1
+        self.states.append((int(status["state"][0]), int(status["reason"][0])))
+        self.speeds.append(float(status["tool_speed"][0]))
         if self.speaks and tick % 16 == 1:
-            self.tell(int(board["tick"][0]))
+            self.tell(int(status["tick"][0]))
         each(self, tick)
 
     def run(self, ticks):

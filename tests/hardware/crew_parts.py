@@ -15,33 +15,33 @@ from contactsafe.hardware.states import RUNNING, STOPPED, TIME_UP
 def control(path):
     """Tick a thousand times a second until the run is to end."""
     exchange = Exchange(path)
-    board = exchange.board
-    while not board["go"][0] and not board["finished"][0]:
-        board["beat_control"] += 1
+    status = exchange.status
+    while not status["go"][0] and not status["finished"][0]:
+        status["beat_control"] += 1
         time.sleep(0.001)
-    board["state"] = RUNNING
-    while not board["stop"][0] and not board["finished"][0]:
-        board["beat_control"] += 1
-        board["tick"] += 1
+    status["state"] = RUNNING
+    while not status["stop"][0] and not status["finished"][0]:
+        status["beat_control"] += 1
+        status["tick"] += 1
         time.sleep(0.001)
-        if 0 < board["last_tick"][0] <= board["tick"][0]:
+        if 0 < status["last_tick"][0] <= status["tick"][0]:
             exchange.ask_to_stop(TIME_UP)
-    board["state"], board["reason"], board["finished"] = STOPPED, board["stop"], 1
+    status["state"], status["reason"], status["finished"] = STOPPED, status["stop"], 1
 
 
 def policy(path):
     """Be ready, and end with the run."""
     exchange = Exchange(path)
-    exchange.board["beat_policy"] += 1
-    while not exchange.board["finished"][0]:
+    exchange.status["beat_policy"] += 1
+    while not exchange.status["finished"][0]:
         time.sleep(0.005)
 
 
 def dog(path):
     """Beat until the run is over."""
     exchange = Exchange(path)
-    while not exchange.board["finished"][0]:
-        exchange.board["beat_watchdog"] += 1
+    while not exchange.status["finished"][0]:
+        exchange.status["beat_watchdog"] += 1
         time.sleep(0.005)
 
 
@@ -54,7 +54,7 @@ def stays(path):
     """Be ready, and never end by itself."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     exchange = Exchange(path)
-    exchange.board["beat_policy"] += 1
+    exchange.status["beat_policy"] += 1
     time.sleep(60.0)
 
 
@@ -62,15 +62,15 @@ def holder(path, position, quat, posture):
     """Ask for one pose at every tick, tick by tick, as a policy in lockstep does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     exchange = Exchange(path)
-    board, seen, message = exchange.board, np.zeros(1, seen_dtype(7)), np.zeros(1, message_dtype(7))
-    board["pid_policy"] = os.getpid()
+    status, seen, message = exchange.status, np.zeros(1, seen_dtype(7)), np.zeros(1, message_dtype(7))
+    status["pid_policy"] = os.getpid()
     row = message[0]
     row["position"], row["quat"], row["q_posture"], row["joints"] = position, quat, posture, 7
     row["K_task"], row["D_task"] = [150.0] * 3 + [450.0] * 3, [24.0] * 3 + [42.0] * 3
-    board["beat_policy"] += 1
-    while not board["finished"][0]:
+    status["beat_policy"] += 1
+    while not status["finished"][0]:
         if receive(exchange.seen, as_words(seen)) > 0 and seen["tick"][0] > row["of_tick"]:
             row["number"], row["of_tick"] = row["number"] + 1, seen["tick"][0]
             publish(exchange.targets, as_words(message))
-            board["ready_policy"] = row["of_tick"]
+            status["ready_policy"] = row["of_tick"]
         time.sleep(0)

@@ -26,7 +26,7 @@ def exchange():
     (states.STOPPED, states.TIME_UP, 28, False),
 ])  # fmt: skip
 def test_a_run_went_well_where_it_stopped_for_a_good_reason_and_was_recorded(exchange, state, reason, errno, well):
-    exchange.board["state"], exchange.board["reason"], exchange.board["recorder_errno"] = state, reason, errno
+    exchange.status["state"], exchange.status["reason"], exchange.status["recorder_errno"] = state, reason, errno
     ending = ending_of(exchange)
     assert ending.went_well is well
     assert (ending.state, ending.reason) == (states.STATES[state], states.REASONS[reason].name)
@@ -34,14 +34,14 @@ def test_a_run_went_well_where_it_stopped_for_a_good_reason_and_was_recorded(exc
 
 
 def test_the_busy_time_is_told_by_its_distribution(exchange):
-    exchange.board["busy"][0, [30, 100, 700]] = [980, 15, 5]
+    exchange.status["busy"][0, [30, 100, 700]] = [980, 15, 5]
     assert ending_of(exchange).busy_us == (30, 100, 700, 5)
 
 
 def test_a_run_in_which_all_do_their_part_ends_well_and_leaves_nothing(exchange):
     looks = []
     parts = [Part("control", crew_parts.control), Part("policy", crew_parts.policy), Part("watchdog", crew_parts.dog)]
-    ending = run_crew(exchange, parts, 0.3, lambda board: looks.append(int(board["tick"])))
+    ending = run_crew(exchange, parts, 0.3, lambda status: looks.append(int(status["tick"])))
     assert ending.went_well
     assert ending.reason == "time is up"
     assert looks

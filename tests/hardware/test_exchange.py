@@ -20,13 +20,13 @@ def exchange():
 
 def test_what_one_process_writes_the_other_sees(exchange):
     other = Exchange(exchange.path)
-    exchange.board["tick"], exchange.targets[3], exchange.ticks[5]["sent"] = 12, 7, np.arange(7.0)
-    exchange.steps[2]["ink"] = 9
+    exchange.status["tick"], exchange.targets[3], exchange.ticks[5]["sent"] = 12, 7, np.arange(7.0)
+    exchange.steps[2]["shown"] = 9
     assert other.joints == 7
-    assert other.board["tick"][0] == 12
+    assert other.status["tick"][0] == 12
     assert other.targets[3] == 7
     assert (other.ticks[5]["sent"] == np.arange(7.0)).all()
-    assert other.steps[2]["ink"] == 9
+    assert other.steps[2]["shown"] == 9
 
 
 def test_nobody_else_may_read_it(exchange):
@@ -42,7 +42,7 @@ def test_nothing_is_left_after_it_is_unlinked_and_unlinking_twice_does_no_harm(e
 def test_the_first_reason_to_stop_stays(exchange):
     exchange.ask_to_stop(TIME_UP)
     exchange.ask_to_stop(ASKED)
-    assert exchange.board["stop"][0] == TIME_UP
+    assert exchange.status["stop"][0] == TIME_UP
 
 
 def test_a_file_that_is_none_is_refused_in_one_line(tmp_path):

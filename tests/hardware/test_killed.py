@@ -46,7 +46,7 @@ class Run:
     def __init__(self, folder):
         self.arm, self.folder = robots.fr3(), folder
         self.exchange, self.happened = Exchange.create(7), False
-        self.exchange.board["lockstep"] = 1
+        self.exchange.status["lockstep"] = 1
         settings = ControlSettings(
             self.arm, presets.safe(), FrankaPort("127.0.0.1"), lockstep=True, rights=Realtime(0, -1, False)
         )
@@ -62,10 +62,12 @@ class Run:
         """Run, and let it happen once; return how it ended and the processes' numbers."""
         pids = {}
 
-        def look(board):
-            if board["tick"] > 500 and not self.happened:
+        def look(status):
+            if status["tick"] > 500 and not self.happened:
                 self.happened = True
-                pids.update({name: int(board[f"pid_{name}"]) for name in ("control", "policy", "recorder", "watchdog")})
+                pids.update(
+                    {name: int(status[f"pid_{name}"]) for name in ("control", "policy", "recorder", "watchdog")}
+                )
                 happen(pids, self.robot.process.pid)
 
         self.robot = SimulatedRobot(FrankaScene(robots.WIPER), self.arm.home, lockstep=True)

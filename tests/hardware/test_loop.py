@@ -10,7 +10,7 @@ from contactsafe.hardware.port import RobotError
 def test_an_arm_that_is_asked_to_stay_stays_and_gravity_is_the_robots(bench):
     one = bench()
     one.run(400)
-    assert (one.board["state"], one.board["reason"]) == (states.STOPPING, states.TIME_UP)
+    assert (one.status["state"], one.status["reason"]) == (states.STOPPING, states.TIME_UP)
     assert np.abs(one.robot.q - one.arm.home).max() < 2e-3
     assert np.abs(one.robot.sent).max() < 1.0  # of up to 30 N m that hold it
     assert one.robot.calls == ["begin", "finish"]
@@ -25,8 +25,8 @@ def test_every_step_of_the_torque_keeps_to_nine_tenths_of_the_robots_rate(bench)
     one.run(500)
     steps = np.diff(np.vstack([np.zeros(7), *one.robot.sent]), axis=0)
     assert np.abs(steps).max() <= 0.9 + 1e-9
-    assert one.board["first_step_nm"] <= 0.9
-    assert one.board["largest_step_nm"] == pytest.approx(np.abs(steps[1:]).max())
+    assert one.status["first_step_nm"] <= 0.9
+    assert one.status["largest_step_nm"] == pytest.approx(np.abs(steps[1:]).max())
 
 
 def test_a_target_is_followed(bench):
@@ -63,14 +63,14 @@ def not_finite(one, tick):
     moving(one, tick)
     one.speaks = tick < 400
     if tick >= 400 and tick % 16 == 1:
-        one.tell(int(one.board["tick"]), position=np.full(3, np.nan))
+        one.tell(int(one.status["tick"]), position=np.full(3, np.nan))
 
 
 def of_another_length(one, tick):
     moving(one, tick)
     one.speaks = tick < 400
     if tick >= 400 and tick % 16 == 1:
-        one.tell(int(one.board["tick"]), joints=6)
+        one.tell(int(one.status["tick"]), joints=6)
 
 
 def slow_by(ticks):
@@ -78,7 +78,7 @@ def slow_by(ticks):
         moving(one, tick)
         one.speaks = tick < 400
         if tick >= 400 and tick % 16 == 1:
-            one.tell(int(one.board["tick"]) - ticks)
+            one.tell(int(one.status["tick"]) - ticks)
 
     return each
 
@@ -94,7 +94,7 @@ def backwards(one, tick):
 def no_watchdog(one, tick):
     moving(one, tick)
     if tick > 400:
-        one.exchange.board["beat_watchdog"] -= 1
+        one.exchange.status["beat_watchdog"] -= 1
 
 
 def asked(one, tick):
@@ -126,7 +126,7 @@ def test_a_moving_arm_comes_to_rest_for_a_reason_that_is_named(bench, fault):
     begins = next(k for k, state in enumerate(kinds) if state in (states.HELD, states.STOPPING))
     assert one.speeds[begins] > 0.05
     assert max(one.speeds[begins + 300 :], default=0.0) < 0.01
-    assert (one.board["state"], one.board["reason"]) == (states.STOPPING, reason)
+    assert (one.status["state"], one.status["reason"]) == (states.STOPPING, reason)
     assert "finish" in one.robot.calls
     heights = one.arm.tool_pose(one.robot.q).position[2] - one.arm.tool_pose(one.arm.home).position[2]
     assert abs(heights) < 0.02
@@ -140,7 +140,7 @@ def test_a_policy_that_is_late_once_is_held_and_goes_on(bench, ticks):
     assert states.HELD in kinds
     assert kinds[-1] in (states.STOPPING, states.RUNNING)
     assert states.RUNNING in kinds[kinds.index(states.HELD) + 150 :]
-    assert one.board["reason"] == states.TIME_UP
+    assert one.status["reason"] == states.TIME_UP
 
 
 def test_a_robot_that_stops_by_itself_is_told_by_its_own_words(bench):
@@ -161,7 +161,7 @@ def test_measurements_that_are_lost_for_long_brake_the_arm_and_the_run_is_a_faul
 
     one = bench(freeze)
     one.run(1500)
-    assert (one.board["state"], one.board["reason"]) == (states.FAULT, states.BRAKED)
+    assert (one.status["state"], one.status["reason"]) == (states.FAULT, states.BRAKED)
     assert "finish" in one.robot.calls
 
 
@@ -173,7 +173,7 @@ def test_a_push_is_rejected_while_the_policy_waits(bench):
     for preset in ("vices", "safe"):
         one = bench(lean, preset=preset)
         one.run(1500)
-        rows = one.exchange.ticks[: int(one.board["rows"])]
+        rows = one.exchange.ticks[: int(one.status["rows"])]
         away = rows["output"]["position"] - rows["output"]["position"][450]
         moved[preset] = np.linalg.norm(away[500:1500], axis=1).max()
     assert moved["safe"] < 0.5 * moved["vices"]

@@ -25,23 +25,23 @@ def exchange():
 
 def put(exchange, count, seed=0):
     """Put ticks of random numbers into the ring."""
-    rng, board = np.random.default_rng(seed), exchange.board
+    rng, status = np.random.default_rng(seed), exchange.status
     for _ in range(count):
-        number = int(board["rows"][0])
+        number = int(status["rows"][0])
         row = exchange.ticks[number % TICKS]
         row["tick"], row["stamp"] = number, time.time_ns()
         for name in ("q", "qd", "torque"):
             row["reading"][name] = rng.standard_normal(7)
         row["output"]["point"] = np.nan
         row["output"]["rotation"] = rng.standard_normal((3, 3))
-        board["rows"] += 1
+        status["rows"] += 1
 
 
 def test_every_tick_comes_back_bit_by_bit(exchange, tmp_path):
     written = Recorder(exchange, tmp_path / "run.mcap", RUN)
     put(exchange, 300)
-    exchange.steps[0]["ink"] = 17
-    exchange.board["steps_written"] = 1
+    exchange.steps[0]["shown"] = 17
+    exchange.status["steps_written"] = 1
     written.drain()
     put(exchange, 50, seed=1)
     written.drain()
@@ -49,8 +49,8 @@ def test_every_tick_comes_back_bit_by_bit(exchange, tmp_path):
     run, rows = read_run(tmp_path / "run.mcap", row_dtype(7))
     assert run == RUN
     assert rows.tobytes() == exchange.ticks[:350].tobytes()
-    assert read_run(tmp_path / "run.mcap", step_dtype(), STEPS_TOPIC)[1]["ink"].tolist() == [17]
-    assert exchange.board["dropped"][0] == 0
+    assert read_run(tmp_path / "run.mcap", step_dtype(), STEPS_TOPIC)[1]["shown"].tolist() == [17]
+    assert exchange.status["dropped"][0] == 0
 
 
 def test_a_reader_that_knows_nothing_of_contactsafe_finds_the_numbers_by_their_names(exchange, tmp_path):
@@ -90,20 +90,20 @@ def test_a_file_that_was_never_finished_is_read_up_to_its_end(exchange, tmp_path
 def test_a_recorder_that_is_too_slow_leaves_ticks_out_and_counts_them(exchange, tmp_path):
     written = Recorder(exchange, tmp_path / "run.mcap", RUN)
     put(exchange, 10)
-    exchange.board["rows"] = 3 * TICKS
+    exchange.status["rows"] = 3 * TICKS
     written.drain()
-    assert exchange.board["dropped"][0] > TICKS
-    assert exchange.board["recorded"][0] == 3 * TICKS
+    assert exchange.status["dropped"][0] > TICKS
+    assert exchange.status["recorded"][0] == 3 * TICKS
 
 
 def test_a_full_disk_ends_the_log_and_not_the_run(exchange, capfd):
     """/dev/full refuses every write."""
     from pathlib import Path
 
-    exchange.board["finished"] = 0
+    exchange.status["finished"] = 0
     record(str(exchange.path), Path("/dev/full"), RUN)
-    assert exchange.board["recorder_errno"][0] == errno.ENOSPC
-    assert exchange.board["stop"][0] == 0
+    assert exchange.status["recorder_errno"][0] == errno.ENOSPC
+    assert exchange.status["stop"][0] == 0
     assert "the run goes on without a log" in capfd.readouterr().out
 
 

@@ -20,8 +20,8 @@ class Scene:
         self.processes = {}
         for name in ("control", "policy", "recorder"):
             self.processes[name] = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-            self.exchange.board[f"pid_{name}"] = self.processes[name].pid
-        self.exchange.board["state"] = states.RUNNING
+            self.exchange.status[f"pid_{name}"] = self.processes[name].pid
+        self.exchange.status["state"] = states.RUNNING
         monkeypatch.setattr(watchdog.time, "monotonic", lambda: self.now)
         self.dog = Watchdog(self.exchange)
         self.beats = ["beat_control", "beat_policy", "beat_command"]
@@ -29,7 +29,7 @@ class Scene:
     def look(self, seconds=0.01):
         self.now += seconds
         for name in self.beats:
-            self.exchange.board[name] += 1
+            self.exchange.status[name] += 1
         return self.dog.look()
 
     def kill(self, name):
@@ -42,7 +42,7 @@ class Scene:
 
     @property
     def stop(self):
-        return int(self.exchange.board["stop"][0])
+        return int(self.exchange.status["stop"][0])
 
     def close(self):
         for process in self.processes.values():
@@ -61,7 +61,7 @@ def scene(monkeypatch):
 def test_a_run_in_which_all_live_is_left_alone(scene):
     assert not any(scene.look(0.05) for _ in range(50))
     assert scene.stop == 0
-    assert scene.exchange.board["beat_watchdog"][0] == 50
+    assert scene.exchange.status["beat_watchdog"][0] == 50
 
 
 def test_a_policy_that_dies_ends_the_run_by_name(scene):
@@ -75,8 +75,8 @@ def test_a_control_process_that_dies_is_a_fault_and_the_others_are_seen_off(scen
     scene.look()
     scene.kill("control")
     scene.look()
-    board = scene.exchange.board
-    assert (board["state"][0], board["reason"][0]) == (states.FAULT, states.CONTROL_DEAD)
+    status = scene.exchange.status
+    assert (status["state"][0], status["reason"][0]) == (states.FAULT, states.CONTROL_DEAD)
     assert not scene.look()  # policy and recorder may still finish
     scene.look(5.0)
     for name in ("policy", "recorder"):
@@ -89,7 +89,7 @@ def test_a_control_process_that_dies_is_a_fault_and_the_others_are_seen_off(scen
 ])  # fmt: skip
 def test_a_control_loop_that_stands_still_is_told_from_a_robot_that_is_silent(scene, waits, seconds, reason):
     scene.look()
-    scene.exchange.board["waits_for_robot"] = waits
+    scene.exchange.status["waits_for_robot"] = waits
     scene.beats.remove("beat_control")
     scene.look()
     scene.look(seconds)
@@ -97,7 +97,7 @@ def test_a_control_loop_that_stands_still_is_told_from_a_robot_that_is_silent(sc
 
 
 def test_in_lockstep_nothing_is_too_slow(scene):
-    scene.exchange.board["lockstep"] = 1
+    scene.exchange.status["lockstep"] = 1
     scene.look()
     scene.beats.remove("beat_control")
     scene.look(60.0)
@@ -123,7 +123,7 @@ def test_a_control_process_that_does_not_let_go_is_ended(scene):
 
 def test_it_is_over_once_the_robot_is_let_go_of_and_all_are_gone(scene):
     scene.look()
-    scene.exchange.board["finished"] = 1
+    scene.exchange.status["finished"] = 1
     assert not scene.look()
     for name in scene.processes:
         scene.kill(name)
@@ -131,6 +131,6 @@ def test_it_is_over_once_the_robot_is_let_go_of_and_all_are_gone(scene):
 
 
 def test_a_process_number_that_was_never_given_is_nobody(scene):
-    scene.exchange.board["pid_policy"] = 0
+    scene.exchange.status["pid_policy"] = 0
     scene.look()
     assert scene.stop == 0

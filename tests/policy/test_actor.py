@@ -167,7 +167,7 @@ def test_without_sight_the_arm_is_held_where_it_is_and_goes_on_with_sight(stage)
     for _ in range(5):
         one.step()
     assert math.dist(one.path[-1], held) > 1e-3
-    assert one.exchange.board["stop"][0] == 0
+    assert one.exchange.status["stop"][0] == 0
 
 
 def test_a_camera_that_stays_silent_ends_the_run_by_name(stage, monkeypatch):
@@ -176,13 +176,13 @@ def test_a_camera_that_stays_silent_ends_the_run_by_name(stage, monkeypatch):
     one.work.blind = True
     for _ in range(12):
         one.step()
-    assert one.exchange.board["stop"][0] == states.CAMERA_SILENT
+    assert one.exchange.status["stop"][0] == states.CAMERA_SILENT
 
 
 def test_what_it_did_is_recorded_step_by_step(stage):
     one = stage()
     one.travel()
-    written = int(one.exchange.board["steps_written"][0])
+    written = int(one.exchange.status["steps_written"][0])
     row = one.exchange.steps[(written - 1) % len(one.exchange.steps)]
     assert row["of_tick"] == one.tick
     assert np.abs(row["action"]).max() > 0.0

@@ -27,9 +27,7 @@ from contactsafe.robot.robots import fr3, panda
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks import DEFAULT_TASK, TASKS, make_vec, task_by_name
 from contactsafe.tasks.base.task import Task
-from contactsafe.tasks.insertion.config import InsertionConfig
-from contactsafe.tasks.insertion.robot import InsertionWork
-from contactsafe.tasks.insertion.scene import PEG
+from contactsafe.tasks.insertion.robot import InsertionRobot
 from contactsafe.vision.rectify import rectify
 
 MOST_JOINTS = 14
@@ -97,8 +95,8 @@ def _run_worlds() -> None:
 
 def _drive() -> None:
     """Make both for a robot that is none; they run once without driving anything."""
-    exchange, work = Exchange.create(len(FR3.links)), InsertionWork(InsertionConfig())
-    arm = fr3(PEG)
+    exchange, task = Exchange.create(len(FR3.links)), InsertionRobot()
+    arm, work = fr3(task.tool), task.work()
     try:
         nothing: Any = SimpleNamespace(torque_rate=np.ones(arm.n))
         ControlLoop(ControlSettings(arm, safe(), nothing), exchange)

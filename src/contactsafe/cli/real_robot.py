@@ -69,8 +69,8 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
     lines = [
         f"robot        {asked.robot}, {mode}; joints at least {margin.min():.2f} rad from their limits",
         f"tool         {arm.tool.name if arm.tool else 'none'}, {weight}; now at {_words(tool)} m",
-        f"first move   up, aside and down to {_words(start)} m: is that way free?",
-        f"workspace    about {_words(np.array(work.centre))} m: does board or block stand there, level?",
+        f"first move   up, aside and down to {_words(start)} m: is that path free?",
+        f"workspace    about {_words(np.array(work.centre))} m: does what is worked on stand there, level?",
         f"speed        {asked.speed:g} of the policy's own; begin with --speed 0.2",
         f"collisions   the robot stops by itself beyond {COLLISION_NM:g} N m and {COLLISION_N:g} N: raised, since the "
         "controller keeps contacts gentle by itself, and an impact is short",

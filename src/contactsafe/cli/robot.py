@@ -13,6 +13,7 @@ import tyro
 from contactsafe.cli.arms import CalibrationFile
 from contactsafe.cli.common import BundleFolder, TaskName, load_bundle, task_of
 from contactsafe.control import presets
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
 from contactsafe.experiments.robot_run import RobotRun, robot_runs
@@ -117,8 +118,8 @@ def run(arguments: Sequence[str]) -> None:
     """Let a policy work on a Franka, gently, with all that a real robot needs around it.
 
     The control loop, the policy, a flight recorder and a watchdog each have a process of their own. With --simulated
-    the same processes run against a simulated Franka that speaks the robot's own protocol on this machine, before a
-    whiteboard whose ink vanishes, while the arm is pushed and meets a bottle.
+    the same processes run against a simulated Franka that speaks the robot's own protocol on this machine, while the
+    arm is pushed and meets a bottle.
     """
     asked = parse(Options, "contactsafe run", arguments, description=docstring(run))
     asked.check()
@@ -145,7 +146,7 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
     folder = asked.out / controller.replace(":", "-")
     folder.mkdir(parents=True, exist_ok=True)
     exchange = Exchange.create(arm.n)
-    exchange.board["lockstep"] = asked.lockstep
+    exchange.status["lockstep"] = asked.lockstep
     simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone)
     robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
     try:
@@ -192,26 +193,28 @@ def load_of(arm: Arm) -> tuple[float, np.ndarray, np.ndarray] | None:
     return extra, centre, np.zeros((3, 3))
 
 
-class StatusLine:
+class StatusLine(Unique):
     """One line on a terminal that says how a run goes; elsewhere a line every five seconds."""
+
+    _why = "a status line belongs to one terminal; make another one"
 
     def __init__(self) -> None:
         self._live, self._last = sys.stderr.isatty(), 0.0
 
-    def __call__(self, board: np.void) -> None:
+    def __call__(self, status: np.void) -> None:
         """Say it."""
         now = time.monotonic()
         if now - self._last < (0.2 if self._live else 5.0):
             return
         self._last = now
-        state = STATES[int(board["state"])]
-        reason = f" ({REASONS[int(board['reason'])].name})" if board["reason"] else ""
-        contact = f"link {board['contact_link']} {board['contact_nm']:.0f} N m" if board["contact_link"] else "none"
-        counts = np.cumsum(board["busy"])
+        state = STATES[int(status["state"])]
+        reason = f" ({REASONS[int(status['reason'])].name})" if status["reason"] else ""
+        contact = f"link {status['contact_link']} {status['contact_nm']:.0f} N m" if status["contact_link"] else "none"
+        counts = np.cumsum(status["busy"])
         busy = int(np.searchsorted(counts, 0.99 * counts[-1])) if counts[-1] else 0
         line = (
-            f"{board['tick'] / 1000:6.1f} s  {state}{reason}  contact {contact}  tool {board['tool_n']:.0f} N  "
-            f"target {board['target_age']} ms old  busy {busy} µs  lost {board['lost']}  refused {board['refused']}"
+            f"{status['tick'] / 1000:6.1f} s  {state}{reason}  contact {contact}  tool {status['tool_n']:.0f} N  "
+            f"target {status['target_age']} ms old  busy {busy} µs  lost {status['lost']}  refused {status['refused']}"
         )
         print(f"\r{line:110s}" if self._live else line, end="" if self._live else "\n", file=sys.stderr, flush=True)
 

@@ -15,7 +15,7 @@ from contactsafe.sim.franka_meetings import FOR_S, GOES_S, REST_S
 
 NAME = "run"
 QUESTION = (
-    "A policy works on a simulated Franka over the robot's own protocol; a bottle held by 2 kN/m is in the way of its "
+    "A policy works on a simulated Franka over the robot's own protocol; a bottle held by 2 kN/m is in the path of its "
     "wrist, and a person pushes it with 25 N: is the work done, and how gently?"
 )
 SCENARIO = "simulated Franka"

@@ -11,13 +11,14 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.records import controller_dtype
 from contactsafe.control.signals import Target
+from contactsafe.core.copying import Unique
 from contactsafe.hardware import realtime
-from contactsafe.hardware.board import BUSY_BINS
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.loop import loop_dtype, turn
 from contactsafe.hardware.messages import as_words
 from contactsafe.hardware.port import RobotPort
 from contactsafe.hardware.states import IDLE, RUNNING
+from contactsafe.hardware.status import BUSY_BINS
 from contactsafe.robot.arm import Arm
 
 _STIFFNESS = np.array([150.0, 150.0, 150.0, 450.0, 450.0, 450.0])
@@ -48,13 +49,15 @@ def for_robot(config: ControllerConfig) -> ControllerConfig:
     return config.with_(friction_compensation=False, torque_rate_fraction=0.9)
 
 
-class ControlLoop:
+class ControlLoop(Unique):
     """The loop, made and warmed up before the robot is taken over.
 
     Args:
         settings: as given.
         exchange: of the run.
     """
+
+    _why = "a control loop drives one robot; make another one"
 
     def __init__(self, settings: ControlSettings, exchange: Exchange):
         self.settings, self.exchange, self.port = settings, exchange, settings.port
@@ -78,19 +81,19 @@ class ControlLoop:
         )
         records = self.controller._records.view(controller_dtype(self.settings.arm.n))
         self._arguments = (
-            records, loop, exchange.board, exchange.targets, message, exchange.seen, seen, exchange.ticks,
+            records, loop, exchange.status, exchange.targets, message, exchange.seen, seen, exchange.ticks,
         )  # fmt: skip
 
     def _warm_up(self) -> None:
         """Run the turn on records that drive nothing, then forget what it did."""
-        arm, board = self.settings.arm, self.exchange.board.copy()
+        arm, status = self.settings.arm, self.exchange.status.copy()
         boxes = [box.copy() for box in (self.exchange.targets, self.exchange.seen)]
         rows = self.exchange.ticks[:8].copy()
         self.begin_at(arm.home, np.zeros(arm.n))
         records, loops, _, _, message, _, seen, _ = self._arguments
         for _ in range(300):
             self._reading["time"] += 0.001
-            turn(records, loops, board, boxes[0], message, boxes[1], seen, rows)
+            turn(records, loops, status, boxes[0], message, boxes[1], seen, rows)
         self.begin_at(arm.home, np.zeros(arm.n))
 
     def begin_at(self, q: np.ndarray, qd: np.ndarray) -> None:
@@ -107,7 +110,7 @@ class ControlLoop:
 
     def run(self) -> None:
         """Take the robot over, and control it until the run ends."""
-        port, board = self.port, self.exchange.board
+        port, status = self.port, self.exchange.status
         port.look(self._reading)
         self.begin_at(self._reading["q"][0].copy(), np.zeros(self.settings.arm.n))
         self._note_beginning()
@@ -115,22 +118,22 @@ class ControlLoop:
         gc.freeze()
         gc.disable()
         port.begin()
-        board["state"] = RUNNING
+        status["state"] = RUNNING
         self._cycle()
 
     def _note_beginning(self) -> None:
         """Put where the run begins into the recorder's ring, as tick 0."""
-        row, record, board = self.exchange.ticks[0], self.controller.record, self.exchange.board
+        row, record, status = self.exchange.ticks[0], self.controller.record, self.exchange.status
         row["tick"], row["stamp"], row["state"] = 0, time.time_ns(), IDLE
         row["measurement"], row["target"] = record["measurement"], record["target"]
-        board["rows"] = 1
+        status["rows"] = 1
 
     def _cycle(self) -> None:
         """Turn until the run has ended; views of single numbers are made before, for they cost a microsecond each."""
-        port, loops, board, reading = self.port, self.loops, self.exchange.board, self._reading
-        arguments, sent, busy = self._arguments, loops["sent"][0], board["busy"][0]
+        port, loops, status, reading = self.port, self.loops, self.exchange.status, self._reading
+        arguments, sent, busy = self._arguments, loops["sent"][0], status["busy"][0]
         stamp, busy_ns, ticks, done = (loops[name] for name in ("stamp", "busy_ns", "tick", "done"))
-        lost, waits = board["lost"], board["waits_for_robot"]
+        lost, waits = status["lost"], status["waits_for_robot"]
         clock, wall, lockstep = time.perf_counter_ns, time.time_ns, self.settings.lockstep
         while not done[0]:
             waits[0] = 1
@@ -150,6 +153,6 @@ class ControlLoop:
 
     def _wait_for_policy(self) -> None:
         """Wait until the policy has seen this tick, where a run is to be the same again."""
-        board = self.exchange.board
-        while board["ready_policy"][0] < board["tick"][0] and board["stop"][0] == 0:
+        status = self.exchange.status
+        while status["ready_policy"][0] < status["tick"][0] and status["stop"][0] == 0:
             time.sleep(0)

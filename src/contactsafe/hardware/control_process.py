@@ -19,31 +19,31 @@ def control(exchange_path: str, settings: ControlSettings) -> None:
         settings: as given.
     """
     exchange = Exchange(exchange_path)
-    board = exchange.board
-    board["pid_control"] = os.getpid()
+    status = exchange.status
+    status["pid_control"] = os.getpid()
     try:
         loop = ControlLoop(settings, exchange)
         for line in realtime.apply(settings.rights):
             print(line, flush=True)
         settings.port.connect()
-        board["beat_control"] += 1
-        while not board["go"][0]:
-            if board["stop"][0]:
+        status["beat_control"] += 1
+        while not status["go"][0]:
+            if status["stop"][0]:
                 return
-            board["beat_control"] += 1
+            status["beat_control"] += 1
             time.sleep(0.002)
         loop.run()
-        if board["state"][0] == STOPPING:
-            board["state"] = STOPPED
+        if status["state"][0] == STOPPING:
+            status["state"] = STOPPED
     except RobotError as error:
         silent = "timeout" in str(error).lower() or "network" in str(error).lower() or "udp" in str(error).lower()
-        board["state"], board["reason"] = FAULT, ROBOT_SILENT if silent else ROBOT_FAULT
+        status["state"], status["reason"] = FAULT, ROBOT_SILENT if silent else ROBOT_FAULT
         print(f"robot: {error}", flush=True)
     except ContactSafeError as error:
-        board["state"], board["reason"] = FAULT, ROBOT_FAULT
+        status["state"], status["reason"] = FAULT, ROBOT_FAULT
         print(f"control: {error}", flush=True)
     finally:
-        if board["state"][0] in (IDLE, RUNNING):
-            board["state"] = STOPPED
-        board["finished"] = 1
+        if status["state"][0] in (IDLE, RUNNING):
+            status["state"] = STOPPED
+        status["finished"] = 1
         settings.port.close()

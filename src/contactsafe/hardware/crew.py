@@ -54,12 +54,12 @@ def run_crew(
         exchange: of the run; it is gone afterwards.
         parts: the processes; all but control and watchdog may be left out.
         seconds: for which it runs at most, by the robot's ticks; inf for no end.
-        on_look: called some twenty times a second with the run's board.
+        on_look: called some twenty times a second with the run's status.
 
     Raises:
         RunError: a process ended before the run could begin.
     """
-    context, board = multiprocessing.get_context("spawn"), exchange.board
+    context, status = multiprocessing.get_context("spawn"), exchange.status
     processes = {
         part.name: context.Process(target=part.target, args=(str(exchange.path), *part.arguments)) for part in parts
     }
@@ -67,13 +67,13 @@ def run_crew(
         for process in processes.values():
             process.start()
         _wait_until_ready(processes, exchange)
-        board["last_tick"] = round(1000.0 * seconds) if math.isfinite(seconds) else 0
-        board["go"] = 1
+        status["last_tick"] = round(1000.0 * seconds) if math.isfinite(seconds) else 0
+        status["go"] = 1
         with _asked_by_signal(exchange):
-            while processes["control"].is_alive() and not board["finished"][0]:
-                board["beat_command"] += 1
+            while processes["control"].is_alive() and not status["finished"][0]:
+                status["beat_command"] += 1
                 if on_look:
-                    on_look(board[0])
+                    on_look(status[0])
                 time.sleep(_EVERY_S)
     finally:
         exchange.ask_to_stop(ASKED)
@@ -83,13 +83,13 @@ def run_crew(
 
 def _wait_until_ready(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
     """Wait until control and policy have compiled, loaded and opened what they need."""
-    board, until = exchange.board, time.monotonic() + _READY_S
+    status, until = exchange.status, time.monotonic() + _READY_S
     awaited = [name for name in ("control", "policy", "watchdog") if name in processes]
-    while not all(board[f"beat_{name}"][0] for name in awaited):
-        board["beat_command"] += 1
+    while not all(status[f"beat_{name}"][0] for name in awaited):
+        status["beat_command"] += 1
         gone = [name for name in processes if not processes[name].is_alive()]
         if gone or time.monotonic() > until:
-            board["finished"] = 1
+            status["finished"] = 1
             raise RunError(f"the {gone[0] if gone else awaited[0]} process did not get ready; it said why above")
         time.sleep(_EVERY_S)
 
@@ -113,7 +113,7 @@ def _see_off(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
     """Wait for all to end; the watchdog ends whoever does not, and this does where there is none."""
     until = time.monotonic() + _SEE_OFF_S
     while any(process.is_alive() for process in processes.values()) and time.monotonic() < until:
-        exchange.board["beat_command"] += 1
+        exchange.status["beat_command"] += 1
         time.sleep(_EVERY_S)
     for process in processes.values():
         if process.is_alive():

@@ -41,13 +41,13 @@ class Ending:
 
 def ending_of(exchange: Exchange) -> Ending:
     """Return how a run ended."""
-    board = exchange.board[0]
-    state, reason = int(board["state"]), int(board["reason"])
-    counts = np.cumsum(board["busy"])
+    status = exchange.status[0]
+    state, reason = int(status["state"]), int(status["reason"])
+    counts = np.cumsum(status["busy"])
     median, late, most = (int(np.searchsorted(counts, fraction * counts[-1])) for fraction in (0.5, 0.99, 1.0))
-    well = state == STOPPED and reason in WELL and board["recorder_errno"] == 0
+    well = state == STOPPED and reason in WELL and status["recorder_errno"] == 0
     return Ending(
-        STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(board["tick"]),
-        int(board["refused"]), int(board["lost"]), float(board["first_step_nm"]), float(board["largest_step_nm"]),
-        (median, late, most, int(board["busy"][500:].sum())), int(board["recorded"]), int(board["recorder_errno"]),
+        STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(status["tick"]),
+        int(status["refused"]), int(status["lost"]), float(status["first_step_nm"]), float(status["largest_step_nm"]),
+        (median, late, most, int(status["busy"][500:].sum())), int(status["recorded"]), int(status["recorder_errno"]),
     )  # fmt: skip

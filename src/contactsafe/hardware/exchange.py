@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError, OutputError
-from contactsafe.hardware.board import board_dtype
 from contactsafe.hardware.messages import message_dtype, row_dtype, seen_dtype, step_dtype
+from contactsafe.hardware.status import status_dtype
 
 FOLDER = Path("/dev/shm")
 PREFIX = "contactsafe-run-"
@@ -22,17 +23,19 @@ TICKS, STEPS = 8192, 1024
 """Rows that the rings hold: eight seconds of ticks, seventeen of policy steps."""
 
 
-class Exchange:
+class Exchange(Unique):
     """One run's shared memory, mapped.
 
     Args:
         path: of the file; made by `create`.
 
     Attributes:
-        board: `board_dtype` record of heartbeats, states and figures.
+        status: `status_dtype` record of heartbeats, states and figures.
         targets, seen: mailboxes, int64 words.
         ticks, steps: rings of `row_dtype` and `step_dtype` records.
     """
+
+    _why = "a run's shared memory is mapped once a process; open its path where it is needed"
 
     def __init__(self, path: Path | str):
         self.path = Path(path)
@@ -41,8 +44,8 @@ class Exchange:
                 self._map = mmap.mmap(file.fileno(), 0)
         except (OSError, ValueError) as error:
             raise InvalidInputError(f"{self.path} is no run's shared memory ({error}); start the run anew") from None
-        self.board = np.frombuffer(self._map, board_dtype, 1)
-        n = int(self.board["joints"][0])
+        self.status = np.frombuffer(self._map, status_dtype, 1)
+        n = int(self.status["joints"][0])
         offsets = _offsets(n)
         self.targets = self._words(offsets["targets"], message_dtype(n))
         self.seen = self._words(offsets["seen"], seen_dtype(n))
@@ -55,12 +58,12 @@ class Exchange:
     @property
     def joints(self) -> int:
         """Of the arm."""
-        return int(self.board["joints"][0])
+        return int(self.status["joints"][0])
 
     def ask_to_stop(self, reason: int) -> None:
         """Have the control process bring the arm to rest; the first reason stays."""
-        if self.board["stop"][0] == 0:
-            self.board["stop"][0] = reason
+        if self.status["stop"][0] == 0:
+            self.status["stop"][0] = reason
 
     @classmethod
     def create(cls, n: int) -> "Exchange":
@@ -77,7 +80,7 @@ class Exchange:
             raise OutputError(f"{path} cannot be made ({error.strerror}); a run needs {size >> 20} MB there") from None
         try:
             os.posix_fallocate(handle, 0, size)
-            os.pwrite(handle, np.array([n], np.int64).tobytes(), board_dtype.fields["joints"][1])  # type: ignore[index]
+            os.pwrite(handle, np.array([n], np.int64).tobytes(), status_dtype.fields["joints"][1])  # type: ignore[index]
         except OSError as error:
             os.unlink(path)
             raise OutputError(f"{path}: {error.strerror}; a run needs {size >> 20} MB there") from None
@@ -94,7 +97,7 @@ class Exchange:
 def _offsets(n: int) -> dict[str, int]:
     """Return where each part begins, bytes, on cache lines of their own."""
     parts = {
-        "board": board_dtype.itemsize,
+        "status": status_dtype.itemsize,
         "targets": 8 + message_dtype(n).itemsize,
         "seen": 8 + seen_dtype(n).itemsize,
         "ticks": TICKS * row_dtype(n).itemsize,

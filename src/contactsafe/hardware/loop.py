@@ -58,44 +58,44 @@ def loop_dtype(n: int) -> np.dtype:
 
 @compiled(nogil=True)
 def turn(
-    controllers: np.ndarray, loops: np.ndarray, boards: np.ndarray, inbox: np.ndarray, message_words: np.ndarray,
+    controllers: np.ndarray, loops: np.ndarray, statuses: np.ndarray, inbox: np.ndarray, message_words: np.ndarray,
     outbox: np.ndarray, seen_words: np.ndarray, rows: np.ndarray,
 ) -> None:  # fmt: skip
     """Run one turn: `loop.reading` has been filled, `loop.sent` is for the robot afterwards.
 
     Args:
-        controllers, loops, boards: one record each, `controller_dtype`, `loop_dtype` and `board_dtype`.
+        controllers, loops, statuses: one record each, `controller_dtype`, `loop_dtype` and `status_dtype`.
         inbox, outbox: mailboxes of the targets and of what the policy is told.
         message_words, seen_words: `loop.message` and `loop.seen` as words.
         rows: the recorder's ring.
     """
-    c, loop, board = controllers[0], loops[0], boards[0]
+    c, loop, status = controllers[0], loops[0], statuses[0]
     loop.tick += 1
     gate = loop.gate
     admit(gate, loop.message, receive(inbox, message_words), loop.tick, c)
-    follow_state(gate, loop.tick, _wish_to_stop(loop, board), c)
+    follow_state(gate, loop.tick, _wish_to_stop(loop, status), c)
     _measure(c, loop.reading)
     control_tick(c)
     if c.output.braked != 0 and gate.state != FAULT:
         gate.state, gate.reason = FAULT, BRAKED
-    _send(c, loop, board)
+    _send(c, loop, status)
     _follow_rest(c, loop)
     _tell(c, loop, outbox, seen_words)
-    _report(c, loop, board)
-    _record(c, loop, board, rows)
+    _report(c, loop, status)
+    _record(c, loop, status, rows)
 
 
 @inlined
-def _wish_to_stop(loop: Record, board: Record) -> int:
+def _wish_to_stop(loop: Record, status: Record) -> int:
     """Return why the run is to end, 0 for no reason."""
     loop.watchdog_ticks += 1
-    if board.beat_watchdog != loop.watchdog:
-        loop.watchdog, loop.watchdog_ticks = board.beat_watchdog, 0
-    if board.stop == 0 and board.lockstep == 0 and loop.watchdog_ticks > WATCHDOG_TICKS:
+    if status.beat_watchdog != loop.watchdog:
+        loop.watchdog, loop.watchdog_ticks = status.beat_watchdog, 0
+    if status.stop == 0 and status.lockstep == 0 and loop.watchdog_ticks > WATCHDOG_TICKS:
         return WATCHDOG_SILENT
-    if board.stop == 0 and 0 < board.last_tick <= loop.tick:
+    if status.stop == 0 and 0 < status.last_tick <= loop.tick:
         return TIME_UP
-    return board.stop
+    return status.stop
 
 
 @inlined
@@ -107,7 +107,7 @@ def _measure(c: Record, reading: Record) -> None:
 
 
 @inlined
-def _send(c: Record, loop: Record, board: Record) -> None:
+def _send(c: Record, loop: Record, status: Record) -> None:
     """Take off the gravity that the robot adds, and keep to the rate once more: gravity changes as the arm moves."""
     largest = 0.0
     for i in range(loop.sent.shape[0]):
@@ -117,9 +117,9 @@ def _send(c: Record, loop: Record, board: Record) -> None:
         loop.sent[i] += step
         largest = max(largest, abs(step))
     if loop.tick == 1:
-        board.first_step_nm = largest
+        status.first_step_nm = largest
     else:
-        board.largest_step_nm = max(board.largest_step_nm, largest)
+        status.largest_step_nm = max(status.largest_step_nm, largest)
 
 
 @inlined
@@ -151,27 +151,27 @@ def _tell(c: Record, loop: Record, outbox: np.ndarray, seen_words: np.ndarray) -
 
 
 @inlined
-def _report(c: Record, loop: Record, board: Record) -> None:
+def _report(c: Record, loop: Record, status: Record) -> None:
     gate = loop.gate
-    board.beat_control += 1
-    board.tick, board.state, board.reason = loop.tick, gate.state, gate.reason
-    board.target_age, board.refused = loop.tick - gate.of_tick, gate.refused
+    status.beat_control += 1
+    status.tick, status.state, status.reason = loop.tick, gate.state, gate.reason
+    status.target_age, status.refused = loop.tick - gate.of_tick, gate.refused
     v, force, residual = c.output.velocity, c.state.tool_wrench.force, c.output.residual_fast
-    board.tool_speed = math.sqrt(dot(v[:3], v[:3]))
-    board.contact_link = c.output.link if c.output.mode != 0 else 0
-    board.contact_nm = math.sqrt(dot(residual, residual))
-    board.tool_n = math.sqrt(dot(force, force))
+    status.tool_speed = math.sqrt(dot(v[:3], v[:3]))
+    status.contact_link = c.output.link if c.output.mode != 0 else 0
+    status.contact_nm = math.sqrt(dot(residual, residual))
+    status.tool_n = math.sqrt(dot(force, force))
 
 
 @inlined
-def _record(c: Record, loop: Record, board: Record, rows: np.ndarray) -> None:
+def _record(c: Record, loop: Record, status: Record, rows: np.ndarray) -> None:
     """Put the tick into the ring, and only then count it."""
-    row, gate = rows[board.rows % rows.shape[0]], loop.gate
+    row, gate = rows[status.rows % rows.shape[0]], loop.gate
     row.tick, row.stamp, row.state, row.reason = loop.tick, loop.stamp, gate.state, gate.reason
     row.target_number, row.target_age, row.busy_ns = gate.number, loop.tick - gate.of_tick, loop.busy_ns
     row.reading, row.measurement, row.target, row.output = loop.reading, c.measurement, c.target, c.output
     row.sent[:] = loop.sent
-    board.rows += 1
+    status.rows += 1
 
 
 def is_running(state: int) -> bool:

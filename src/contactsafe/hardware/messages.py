@@ -12,7 +12,7 @@ _i = np.int64
 
 @functools.cache
 def message_dtype(n: int) -> np.dtype:
-    """Describe a policy's target on its way to the control process."""
+    """Describe a policy's target as it goes to the control process."""
     return np.dtype(
         [
             ("number", _i),  # counts up from 1
@@ -92,7 +92,7 @@ def step_dtype() -> np.dtype:
             ("stamp", _i),  # wall clock, ns
             ("busy_ns", _i),
             ("frame_age_ms", _f),  # of the picture that was seen; NaN where none is
-            ("ink", _i),  # pixels of the mask that show something
+            ("shown", _i),  # pixels of the mask that show something
             ("pose", _f, (6,)),
             ("force", _f, (3,)),
             ("action", _f, (18,)),

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import ContactSafeError, InvalidInputError
 
 WIDTH, HEIGHT, RATE_HZ = 1280, 720, 30
@@ -38,13 +39,15 @@ def library() -> Any:
     return pyrealsense2
 
 
-class ColourCamera:
+class ColourCamera(Unique):
     """The colour sensor of a device.
 
     Args:
         serial: of the device; None for the first one.
         sensor, profile: to be read in place of a device's; as a software device has them.
     """
+
+    _why = "a camera is read once; open another one"
 
     def __init__(self, serial: str | None = None, sensor: Any = None, profile: Any = None):
         self._library, self._serial = library(), serial
@@ -138,13 +141,15 @@ class ColourCamera:
         self._queue = None
 
 
-class SoftwareCamera:
+class SoftwareCamera(Unique):
     """A device made of software, with the colour pictures of a RealSense D455 that somebody gives it.
 
     Args:
         fx, fy, cx, cy: of its lens, pixels.
         distortion: k1, k2, p1, p2, k3.
     """
+
+    _why = "a software device belongs to one process; make another one"
 
     def __init__(self, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]):
         rs = library()

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.run_log import CDR, RUN, STEPS_TOPIC, TICKS_TOPIC, ros_schema
@@ -45,7 +46,7 @@ class _File:
         os.close(self._handle)
 
 
-class Recorder:
+class Recorder(Unique):
     """Writes one run.
 
     Args:
@@ -53,6 +54,8 @@ class Recorder:
         path: of the file.
         run: what runs, for whoever reads it: texts by name.
     """
+
+    _why = "a recorder writes one file; make another one"
 
     def __init__(self, exchange: Exchange, path: Path, run: Mapping[str, str]):
         try:
@@ -75,17 +78,17 @@ class Recorder:
 
     def drain(self) -> None:
         """Write what has come since the last time."""
-        board = self.exchange.board
+        status = self.exchange.status
         self._take(self.exchange.ticks, "rows", self._ticks)
         self._take(self.exchange.steps, "steps_written", self._steps)
-        board["recorded"] = self._at["rows"]
+        status["recorded"] = self._at["rows"]
 
     def _take(self, ring: np.ndarray, counter: str, channel: int) -> None:
-        board, size = self.exchange.board, len(ring)
-        upto = int(board[counter][0])
+        status, size = self.exchange.status, len(ring)
+        upto = int(status[counter][0])
         first = max(self._at[counter], upto - size + 64)  # what is about to be written over is left alone
         if counter == "rows":
-            board["dropped"] += first - self._at[counter]
+            status["dropped"] += first - self._at[counter]
         for number in range(first, upto):
             row = ring[number % size]
             stamp = int(row["stamp"])
@@ -104,22 +107,22 @@ def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     """Be the recorder of a run, until the control process has let go of the robot, or nobody is left."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     exchange = Exchange(exchange_path)
-    board = exchange.board
-    board["pid_recorder"] = os.getpid()
+    status = exchange.status
+    status["pid_recorder"] = os.getpid()
     try:
         recorder = Recorder(exchange, path, run)
         beat, heard = -1, time.monotonic()
-        while not board["finished"][0] and time.monotonic() - heard < _ALONE_S:
-            board["beat_recorder"] += 1
+        while not status["finished"][0] and time.monotonic() - heard < _ALONE_S:
+            status["beat_recorder"] += 1
             recorder.drain()
-            if board["beat_watchdog"][0] != beat:
-                beat, heard = int(board["beat_watchdog"][0]), time.monotonic()
+            if status["beat_watchdog"][0] != beat:
+                beat, heard = int(status["beat_watchdog"][0]), time.monotonic()
             time.sleep(_EVERY_S)
         recorder.drain()
         recorder.finish()
     except OSError as error:
-        board["recorder_errno"] = error.errno or -1
+        status["recorder_errno"] = error.errno or -1
         print(f"recorder: {path}: {error.strerror}; the run goes on without a log from here", flush=True)
     except InvalidInputError as error:
-        board["recorder_errno"] = -1
+        status["recorder_errno"] = -1
         print(f"recorder: {error}", flush=True)

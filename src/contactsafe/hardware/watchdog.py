@@ -5,6 +5,7 @@ import os
 import signal
 import time
 
+from contactsafe.core.copying import Unique
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.states import (
     COMMAND_DEAD,
@@ -45,12 +46,14 @@ class _Beats:
         return now - self._last[name][1]
 
 
-class Watchdog:
+class Watchdog(Unique):
     """Watches one run.
 
     Args:
         exchange: of the run.
     """
+
+    _why = "a watchdog holds handles of processes; make another one"
 
     def __init__(self, exchange: Exchange):
         self.exchange, self._beats = exchange, _Beats()
@@ -59,19 +62,19 @@ class Watchdog:
 
     def look(self) -> bool:
         """Look once at all; return whether the run is over and everybody gone."""
-        board, now = self.exchange.board, time.monotonic()
-        board["beat_watchdog"] += 1
+        status, now = self.exchange.status, time.monotonic()
+        status["beat_watchdog"] += 1
         self._adopt()
-        if self._beats.silent_for("command", int(board["beat_command"][0])) > _COMMAND_S:
+        if self._beats.silent_for("command", int(status["beat_command"][0])) > _COMMAND_S:
             self.exchange.ask_to_stop(COMMAND_DEAD)
-        if self._is_dead("policy") and not board["finished"][0]:
+        if self._is_dead("policy") and not status["finished"][0]:
             self.exchange.ask_to_stop(POLICY_DEAD)
         self._look_at_control()
-        if board["stop"][0]:
+        if status["stop"][0]:
             self._asked_at = self._asked_at or now
-            if not board["finished"][0] and now - self._asked_at > _LET_GO_S:
+            if not status["finished"][0] and now - self._asked_at > _LET_GO_S:
                 self._end("control")
-        if not board["finished"][0]:
+        if not status["finished"][0]:
             return False
         self._finished_at = self._finished_at or now
         if all(self._is_dead(name) for name in ("control", *_OTHERS)):
@@ -82,23 +85,23 @@ class Watchdog:
         return False
 
     def _look_at_control(self) -> None:
-        board = self.exchange.board
+        status = self.exchange.status
         if self._is_dead("control"):
-            if not board["finished"][0]:
+            if not status["finished"][0]:
                 self.exchange.ask_to_stop(CONTROL_DEAD)
-                board["state"], board["reason"], board["finished"] = FAULT, CONTROL_DEAD, 1
+                status["state"], status["reason"], status["finished"] = FAULT, CONTROL_DEAD, 1
             return
-        silent = self._beats.silent_for("control", int(board["beat_control"][0]))
-        running = board["state"][0] in (RUNNING, HELD) and not board["lockstep"][0] and not board["finished"][0]
-        waits = bool(board["waits_for_robot"][0])
+        silent = self._beats.silent_for("control", int(status["beat_control"][0]))
+        running = status["state"][0] in (RUNNING, HELD) and not status["lockstep"][0] and not status["finished"][0]
+        waits = bool(status["waits_for_robot"][0])
         if running and silent > (_SILENT_S if waits else _STUCK_S):
             self.exchange.ask_to_stop(ROBOT_SILENT if waits else CONTROL_STUCK)
 
     def _adopt(self) -> None:
         """Get hold of the processes that have come, by handles that no other process can take over."""
-        board = self.exchange.board
+        status = self.exchange.status
         for name in ("control", *_OTHERS):
-            pid = int(board[f"pid_{name}"][0])
+            pid = int(status[f"pid_{name}"][0])
             if pid and name not in self._handles:
                 with contextlib.suppress(OSError):
                     self._handles[name] = os.pidfd_open(pid)
@@ -107,12 +110,12 @@ class Watchdog:
         """Tell whether a process that was there is gone; one that never came counts as gone once all is over."""
         handle = self._handles.get(name)
         if handle is None:
-            return bool(self.exchange.board["finished"][0])
+            return bool(self.exchange.status["finished"][0])
         try:
             signal.pidfd_send_signal(handle, 0)
         except ProcessLookupError:
             return True
-        return _is_zombie(int(self.exchange.board[f"pid_{name}"][0]))
+        return _is_zombie(int(self.exchange.status[f"pid_{name}"][0]))
 
     def _end(self, name: str) -> None:
         with contextlib.suppress(OSError, KeyError):
@@ -132,7 +135,7 @@ def watch(exchange_path: str) -> None:
     """Be the watchdog of a run, until everybody else is gone; the last one out removes the shared memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     exchange = Exchange(exchange_path)
-    exchange.board["pid_watchdog"] = os.getpid()
+    exchange.status["pid_watchdog"] = os.getpid()
     dog = Watchdog(exchange)
     while not dog.look():
         time.sleep(_EVERY_S)

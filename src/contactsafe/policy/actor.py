@@ -1,4 +1,4 @@
-"""A policy and its target on a real robot: on the way to its work, at work, or holding still for want of sight."""
+"""A policy and its target on a real robot: as it goes to its work, at work, or still because it sees nothing."""
 
 import math
 import time
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from contactsafe.control.records import controller_dtype
+from contactsafe.core.copying import Unique
 from contactsafe.hardware.exchange import STEPS, Exchange
 from contactsafe.hardware.mailbox import publish, receive
 from contactsafe.hardware.messages import as_words, message_dtype, seen_dtype
@@ -51,8 +52,10 @@ class PolicySettings:
     rounds: int = 0
 
 
-class Actor:
+class Actor(Unique):
     """The policy and its target, between messages."""
+
+    _why = "an actor speaks for one run; make another one"
 
     def __init__(self, settings: PolicySettings, exchange: Exchange):
         self.settings, self.exchange, self.work = settings, exchange, settings.work
@@ -83,12 +86,12 @@ class Actor:
 
     def step(self) -> None:
         """Look, decide, tell."""
-        began, board, number = time.perf_counter_ns(), self.exchange.board, int(self.message["number"][0])
+        began, status, number = time.perf_counter_ns(), self.exchange.status, int(self.message["number"][0])
         self._take_over()
         observed = self.work.look(self.seen[0], self.pose, self.steps)
-        if self._waits_for_sight():
+        if self._waits_to_see():
             self._tell(number + 1)
-            board["beat_policy"] += 1
+            status["beat_policy"] += 1
             return
         observation = {"pose": self.pose, "target": self.target, **observed}
         if self.steps >= 0 and self.work.is_done():
@@ -103,10 +106,10 @@ class Actor:
             apply_one(self.shadow, 0, self.limits, self.rule, self.action)
             self.steps += 1
         self._tell(number + 1)
-        board["beat_policy"] += 1
+        status["beat_policy"] += 1
         self._record(began, number)
 
-    def _waits_for_sight(self) -> bool:
+    def _waits_to_see(self) -> bool:
         """Hold the arm where it is while the camera shows what is past; end the run where that lasts."""
         self.blind = self.blind + 1 if self.work.is_blind() else 0
         if self.blind == 0:
@@ -128,13 +131,13 @@ class Actor:
     def _travel(self) -> bool:
         """Move the target to the start, first up, then aside, then down; tell whether the tool has waited there."""
         target, start = self.shadow[0]["target"], self.work.start
-        way = start.position - target["position"]
-        if way[2] > 0.0:
-            way[:2] = 0.0  # up before aside
-        elif np.any(np.abs(way[:2]) > 1e-6):
-            way[2] = 0.0  # aside before down
-        length, stride = float(np.linalg.norm(way)), self.work.travel_m_s * self.settings.speed / POLICY_RATE_HZ
-        target["position"] += way * min(1.0, stride / max(length, 1e-9))
+        path = start.position - target["position"]
+        if path[2] > 0.0:
+            path[:2] = 0.0  # up before aside
+        elif np.any(np.abs(path[:2]) > 1e-6):
+            path[2] = 0.0  # aside before down
+        length, stride = float(np.linalg.norm(path)), self.work.travel_m_s * self.settings.speed / POLICY_RATE_HZ
+        target["position"] += path * min(1.0, stride / max(length, 1e-9))
         target["quat"], target["K_task"], target["D_task"] = start.quat, self.stiffness, self.damping
         posture = np.empty(self.settings.arm.n)
         if find_posture(self.rule, target["position"], target["quat"], posture)[0] <= POSITION_TOLERANCE:
@@ -152,11 +155,11 @@ class Actor:
         publish(self.exchange.targets, self.words)
 
     def _record(self, began: int, step: int) -> None:
-        board = self.exchange.board
-        row = self.exchange.steps[int(board["steps_written"][0]) % STEPS]
+        status = self.exchange.status
+        row = self.exchange.steps[int(status["steps_written"][0]) % STEPS]
         row["step"], row["of_tick"], row["stamp"] = step, self.seen[0]["tick"], time.time_ns()
         row["busy_ns"] = time.perf_counter_ns() - began
-        row["frame_age_ms"], row["ink"] = self.work.seen_with()
+        row["frame_age_ms"], row["shown"] = self.work.seen_with()
         row["pose"], row["force"], row["action"] = self.pose, self.seen[0]["force"], self.action
-        board["steps_written"] += 1
-        board["steps"] = step + 1
+        status["steps_written"] += 1
+        status["steps"] = step + 1

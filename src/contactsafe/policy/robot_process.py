@@ -23,14 +23,14 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     exchange = Exchange(exchange_path)
-    board = exchange.board
-    board["pid_policy"] = os.getpid()
+    status = exchange.status
+    status["pid_policy"] = os.getpid()
     work = settings.work
     try:
         work.prepare(settings.arm, settings.lockstep)
         actor = Actor(settings, exchange)
-        board["ready_policy"] = 0
-        board["beat_policy"] += 1
+        status["ready_policy"] = 0
+        status["beat_policy"] += 1
         _follow(actor, exchange)
     except ContactSafeError as error:
         print(f"policy: {error}", flush=True)
@@ -41,21 +41,21 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
 
 def _follow(actor: Actor, exchange: Exchange) -> None:
     """Step whenever the control process has come to the tick of the next step."""
-    board, step, due = exchange.board, 0, 1
-    while not board["finished"][0]:
+    status, step, due = exchange.status, 0, 1
+    while not status["finished"][0]:
         sequence = receive(exchange.seen, actor.seen_words)
         tick = int(actor.seen["tick"][0]) if sequence > 0 else 0
         if tick < due:
             if sequence > 0:
-                board["ready_policy"] = tick
+                status["ready_policy"] = tick
             time.sleep(0 if actor.settings.lockstep and sequence > 0 else _NAP_S)
             continue
         actor.step()
         if actor.done:
             exchange.ask_to_stop(POLICY_DONE)
-            board["ready_policy"] = tick
+            status["ready_policy"] = tick
             return
-        board["ready_policy"] = tick
+        status["ready_policy"] = tick
         while due <= tick:  # a step that came late is left out, not made up for
             due += int(ticks_of_step(step))
             step += 1

@@ -28,7 +28,7 @@ class Work(Protocol):
 
     @property
     def travel_m_s(self) -> float:
-        """Speed of the target on its way to the start, m/s."""
+        """Speed of the target as it goes to the start, m/s."""
         ...
 
     @property

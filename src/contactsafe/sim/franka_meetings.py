@@ -1,4 +1,4 @@
-"""What a simulated Franka meets: a bottle in its wrist's way, and a person's pushes, at rest and amid the work."""
+"""What a simulated Franka meets: a bottle in its wrist's path, and a person's pushes, at rest and amid the work."""
 
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.franka_scene import LinkPush
@@ -9,7 +9,7 @@ REST_S, WORK_S, FOR_S = 7.5, 20.0, 1.0
 """When the arm is pushed, s: while it waits at the start, and while it works; and for how long."""
 
 GOES_S = 2.4
-"""When the bottle, which stood in the way from the beginning, is taken away, s."""
+"""When the bottle, which stood in the path from the beginning, is taken away, s."""
 
 WORK_BEGINS_S = 9.0
 """When there is work, s."""

@@ -8,6 +8,7 @@ from types import TracebackType
 
 import numpy as np
 
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.sim.franka_scene import FrankaScene
 from contactsafe.sim.franka_server import Effect, serve
@@ -15,12 +16,14 @@ from contactsafe.sim.franka_server import Effect, serve
 _READY_S = 900.0
 
 
-class SimulatedRobot:
+class SimulatedRobot(Unique):
     """A context in which a simulated Franka listens on this machine.
 
     Args:
         scene, home, lockstep, effect, truth: as `contactsafe.sim.franka_server.serve` takes them.
     """
+
+    _why = "a simulated robot is a process; make another one"
 
     def __init__(
         self,

@@ -66,7 +66,7 @@ def _words(values: tuple[float, ...]) -> str:
 
 
 def add_tip(hand: ET.Element, scene: FrankaScene, hand_kg: float) -> None:
-    """Put the tip of the scene's tool on the hand's body; it weighs what the tool does beyond the hand alone."""
+    """Put the tip of the scene's tool on the hand's body; its mass is the tool's beyond the hand's."""
     tip, (x, y, z) = scene.tool.tip, scene.tool.tcp
     if tip is None:
         return

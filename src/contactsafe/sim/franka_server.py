@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import mujoco
 import numpy as np
 
+from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.franka import HAND
 from contactsafe.sim.franka_scene import OBSTACLE, TIP, FrankaScene, add_fixtures, add_obstacles, add_tip
@@ -41,7 +42,7 @@ truth_dtype = np.dtype(
 
 
 class Effect(Protocol):
-    """What the tool does to the scene, such as wiping."""
+    """What the tool does to the scene."""
 
     def begin(self, model: mujoco.MjModel) -> None:
         """Prepare, in the server's process; the model is the scene's."""
@@ -52,7 +53,7 @@ class Effect(Protocol):
         ...
 
 
-class SimulatedFranka:
+class SimulatedFranka(Unique):
     """One robot and its scene.
 
     Args:
@@ -61,6 +62,8 @@ class SimulatedFranka:
         address: that it listens at; keep to this machine.
         effect: of the tool, or None.
     """
+
+    _why = "a simulated robot listens at one address; make another one"
 
     def __init__(self, scene: FrankaScene, home: np.ndarray, address: str = "127.0.0.1", effect: Effect | None = None):
         try:

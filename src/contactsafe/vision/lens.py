@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.vision.opencv import cv2
 
@@ -41,7 +42,7 @@ class Lens:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
 
-class Square:
+class Square(Independent):
     """The undistorted square of a camera's picture that a photograph is.
 
     Args:
@@ -74,7 +75,7 @@ class Square:
         return cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-class Distorted:
+class Distorted(Independent):
     """What a camera with a lens makes of a photograph: the synthetic counterpart of `Square`.
 
     Args:

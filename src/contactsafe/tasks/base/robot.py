@@ -58,5 +58,5 @@ class RobotTask(Protocol):
 
 
 def met_by(scene: FrankaScene, arm: Arm) -> FrankaScene:
-    """Return a scene with a bottle in the wrist's way from home, and a person who pushes the arm."""
+    """Return a scene with a bottle in the wrist's path from home, and a person who pushes the arm."""
     return replace(scene, pushes=pushes(), obstacles=(bottle_in_the_way(arm),))

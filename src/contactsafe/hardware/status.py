@@ -8,7 +8,7 @@ BUSY_BINS = 2000
 _i = np.int64
 _f = np.float64
 
-board_dtype = np.dtype(
+status_dtype = np.dtype(
     [
         ("joints", _i),
         ("lockstep", _i),  # the control process waits for the policy's targets, tick by tick
