@@ -1,4 +1,8 @@
-"""Benches of these tests."""
+"""Benches of these tests, and the one address at which a simulated robot listens."""
+
+import fcntl
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -17,3 +21,11 @@ def bench():
     yield make
     for one in made:
         one.close()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Wait until no other process of these tests has a simulated robot: all listen at the same address."""
+    with open(Path(tempfile.gettempdir()) / "contactsafe-tests-robot.lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -29,7 +29,7 @@ from tests.hardware import crew_parts
 pytest.importorskip("pylibfranka")
 pytest.importorskip("franky_sim")
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("address")]
 
 
 def alive(pid):
