@@ -5,9 +5,11 @@ import pytest
 
 from contactsafe.cli import main
 from contactsafe.cli.real_robot import checklist
-from contactsafe.cli.robot import Options, load_of
+from contactsafe.cli.robot import Options, StatusLine, load_of, said_of
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.hardware import states
 from contactsafe.hardware.messages import reading_dtype
+from contactsafe.hardware.status import status_dtype
 from contactsafe.robot import robots
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.tasks.insertion.robot import InsertionRobot
@@ -20,6 +22,7 @@ from contactsafe.tasks.insertion.robot import InsertionRobot
     (["--simulated", "--speed", "3"], "give 0.05 to 1"),
     (["--simulated", "--rounds", "0"], "give 1 to 60"),
     (["--simulated", "--priority", "200"], "give 1 to 99"),
+    (["--simulated", "--dry-run"], "dry_run is for real robots"),
     (["--robot", "172.16.0.2", "--lockstep"], "lockstep is for simulated robots"),
     (["--simulated", "--task", "insertion", "nowhere"], "no bundle at nowhere"),
 ])  # fmt: skip
@@ -38,10 +41,44 @@ def test_a_robot_that_is_not_there_is_told_in_one_line(capsys, tmp_path):
 
 
 def test_the_robot_is_told_what_the_tool_weighs_beyond_its_hand():
-    mass, centre, _ = load_of(robots.fr3(WIPER))
+    mass, centre, inertia = load_of(robots.fr3(WIPER))
     assert mass == pytest.approx(0.1)
-    assert centre[2] == pytest.approx(0.105, abs=0.01)
+    np.testing.assert_allclose(centre, [0.0, 0.0, 0.105], atol=1e-9)  # the felt block's middle
+    half = np.array(WIPER.tip.half_size)
+    alone = (
+        mass / 3.0 * np.diag([half[1] ** 2 + half[2] ** 2, half[0] ** 2 + half[2] ** 2, half[0] ** 2 + half[1] ** 2])
+    )
+    np.testing.assert_allclose(np.linalg.eigvalsh(inertia), np.sort(np.diag(alone)), rtol=1e-6)
     assert load_of(robots.fr3(HAND)) is None
+
+
+def test_the_load_is_told_in_the_flanges_frame_which_the_hand_is_turned_in():
+    """The block's long edge lies along the hand's x, 45 degrees from the flange's."""
+    _, _, inertia = load_of(robots.fr3(WIPER))
+    assert inertia[0, 0] == pytest.approx(inertia[1, 1])
+    assert abs(inertia[0, 1]) > 0.1 * inertia[0, 0]
+
+
+def test_a_log_says_all_that_its_torques_follow_from(tmp_path):
+    asked = Options(simulated=True, calibration=tmp_path / "mine.json")
+    said = said_of(asked, "safe:tank_j=2")
+    assert said == {
+        "robot": "fr3", "task": "wiping", "controller": "safe:tank_j=2", "calibration": str(tmp_path / "mine.json"),
+    }  # fmt: skip
+    assert "calibration" not in said_of(Options(simulated=True), "safe")
+
+
+def test_the_status_line_names_state_reason_contact_and_losses(capsys):
+    status = np.zeros(1, status_dtype)
+    status["tick"], status["state"], status["reason"] = 12_300, states.HELD, states.TARGET_OLD
+    status["contact_link"], status["contact_nm"], status["lost"] = 5, 7.2, 3
+    status["busy"][0, 40] = 10
+    line = StatusLine()
+    line(status[0])
+    line(status[0])  # at once: nothing is said twice
+    (said,) = capsys.readouterr().err.strip().splitlines()
+    for word in ("12.3 s", "held (targets too old)", "link 5 7 N m", "busy 40 µs", "lost 3"):
+        assert word in said
 
 
 def reading_at(arm, q, qd=0.0):

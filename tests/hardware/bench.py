@@ -4,10 +4,12 @@ import numpy as np
 
 from contactsafe.control import presets
 from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
+from contactsafe.hardware.control_process import control
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import publish
 from contactsafe.hardware.messages import as_words, message_dtype
 from contactsafe.hardware.port import RobotError
+from contactsafe.hardware.realtime import Realtime
 from contactsafe.robot import robots
 
 
@@ -24,7 +26,7 @@ class FakeRobot:
         self.torque_rate = np.full(arm.n, 1.0)
         self.q, self.qd, self.time = arm.home.copy(), np.zeros(arm.n), 0.0
         self.motor, self.push, self.ticks = arm.dynamics(self.q, self.qd)["g"].copy(), np.zeros(arm.n), 0
-        self.sent, self.calls = [], []
+        self.sent, self.calls, self.told = [], [], ()
 
     def connect(self):
         self.calls.append("connect")
@@ -53,8 +55,8 @@ class FakeRobot:
     def finish(self):
         self.calls.append("finish")
 
-    def recover(self):
-        self.calls.append("recover")
+    def errors(self):
+        return self.told
 
     def close(self):
         self.calls.append("close")
@@ -77,7 +79,8 @@ class Bench:
         self.arm = robots.fr3()
         self.exchange = Exchange.create(self.arm.n)
         self.robot = FakeRobot(self.arm, lambda tick: self._tick(each, tick))
-        self.loop = ControlLoop(ControlSettings(self.arm, presets.by_name(preset), self.robot), self.exchange)
+        rights = Realtime(0, -1, False)
+        self.settings = ControlSettings(self.arm, presets.by_name(preset), self.robot, rights=rights)
         self.message = np.zeros(1, message_dtype(self.arm.n))
         self.words = as_words(self.message)
         self.pose, self.speaks, self.states, self.speeds = self.arm.tool_pose(self.arm.home), True, [], []
@@ -120,7 +123,12 @@ class Bench:
             return called
 
         self.robot.on_tick = limit(self.robot.on_tick)
-        self.loop.run()
+        ControlLoop(self.settings, self.exchange).run()
+
+    def control(self):
+        """Be the control process of a run that may begin at once."""
+        self.exchange.status["go"] = 1
+        control(str(self.exchange.path), self.settings)
 
     def close(self):
         self.exchange.unlink()

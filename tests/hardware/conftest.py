@@ -1,11 +1,6 @@
-"""Benches of these tests, and the one address at which a simulated robot listens."""
-
-import fcntl
-import tempfile
-from pathlib import Path
+"""Benches of these tests."""
 
 import pytest
-
 from tests.hardware.bench import Bench
 
 
@@ -21,11 +16,3 @@ def bench():
     yield make
     for one in made:
         one.close()
-
-
-@pytest.fixture(scope="module")
-def address():
-    """Wait until no other process of these tests has a simulated robot: all listen at the same address."""
-    with open(Path(tempfile.gettempdir()) / "contactsafe-tests-robot.lock", "w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -58,3 +58,14 @@ def test_records_are_made_of_64_bit_numbers_alone(dtype):
     """So they can be seen as words, and lie in a log as in memory."""
     assert dtype.itemsize % 8 == 0
     assert len(as_words(np.zeros(2, dtype))) == 2 * dtype.itemsize // 8
+
+
+def test_two_runs_of_one_process_share_nothing():
+    one, other = Exchange.create(7), Exchange.create(7)
+    try:
+        one.status["tick"] = 5
+        assert one.path != other.path
+        assert other.status["tick"][0] == 0
+    finally:
+        one.unlink()
+        other.unlink()

@@ -16,13 +16,13 @@ pytest.importorskip("pylibfranka")
 pytest.importorskip("franky_sim")
 pytest.importorskip("pyrealsense2")
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("address")]
+pytestmark = pytest.mark.slow
 
 RUN = ["run", "--simulated", "--lockstep", "--against", "none", "--seed", "2"]
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory, address):
+def runs(tmp_path_factory):
     """Run the wiping policy twice for four seconds of the robot's time."""
     folders = [tmp_path_factory.mktemp("run") for _ in range(2)]
     codes = [main([*RUN, "--seconds", "4", "--out", str(folder)]) for folder in folders]
@@ -77,7 +77,7 @@ def test_nothing_is_left_in_shared_memory(runs):
 
 
 @pytest.fixture(scope="module")
-def pegs(tmp_path_factory, address):
+def pegs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pegs")
     words = [*RUN, "--task", "insertion", "--seconds", "40", "--rounds", "1", "--out", str(folder)]
     assert main(words) == 0

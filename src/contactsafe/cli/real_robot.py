@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from contactsafe.cli.robot import LOG, Options, StatusLine, load_of, parts_of, refuse_failed
+from contactsafe.cli.robot import LOG, Options, StatusLine, load_of, parts_of, refuse_failed, said_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.hardware.crew import run_crew
 from contactsafe.hardware.exchange import Exchange
@@ -28,7 +28,7 @@ def run_real(asked: Options, task: Any, arm: Arm, bundle: Bundle) -> None:
         raise InvalidInputError("not confirmed; nothing was moved")
     exchange = Exchange.create(arm.n)
     try:
-        said = {"robot": "fr3", "task": asked.task, "controller": asked.controller, "address": str(asked.robot)}
+        said = said_of(asked, asked.controller) | {"address": str(asked.robot)}
         address = str(asked.robot)
         parts = parts_of(asked, arm, bundle.folder, work, asked.controller, address, asked.out / LOG, said)
         ending = run_crew(exchange, parts, asked.seconds, StatusLine())

@@ -1,5 +1,6 @@
 """`contactsafe run`: a policy on a Franka, or on a simulated one over the robot's own network protocol."""
 
+import shlex
 import sys
 import time
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from contactsafe.control import presets
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse
+from contactsafe.core.rotation import quat_to_matrix
 from contactsafe.experiments.robot_run import RobotRun, robot_runs
 from contactsafe.hardware.control_loop import ControlSettings
 from contactsafe.hardware.control_process import control
@@ -23,6 +25,7 @@ from contactsafe.hardware.crew import Part, run_crew
 from contactsafe.hardware.ending import Ending
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.franka_port import FrankaPort
+from contactsafe.hardware.realtime import Realtime
 from contactsafe.hardware.recorder import record
 from contactsafe.hardware.states import REASONS, STATES
 from contactsafe.hardware.watchdog import watch
@@ -34,14 +37,15 @@ from contactsafe.report.data import Words
 from contactsafe.report.summary import summarise
 from contactsafe.results.experiment import to_json
 from contactsafe.robot import robots
-from contactsafe.robot.arm import Arm
+from contactsafe.robot.arm import Arm, description_and_tool
+from contactsafe.robot.franka import HAND
 from contactsafe.sim.franka_process import SimulatedRobot
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 
-LOOPBACK = "127.0.0.1"
-"""Where the simulated robot listens, and nowhere else."""
-
 LOG, TRUTH = "run.mcap", "truth.npy"
+
+_LEAST_KG = 1e-3
+"""A lighter load is none."""
 
 WORDS = Words(
     "contactsafe: a run over the robot's protocol",
@@ -110,6 +114,8 @@ class Options:
             raise InvalidInputError(f"rounds = {self.rounds}; give 1 to 60")
         if not 0 <= self.priority <= 99:
             raise InvalidInputError(f"priority = {self.priority}; give 1 to 99, or 0 for none")
+        if self.simulated and self.dry_run:
+            raise InvalidInputError("dry_run is for real robots; a simulated one may move")
         if self.robot is not None and self.lockstep:
             raise InvalidInputError("lockstep is for simulated robots; a real one does not wait")
 
@@ -137,8 +143,9 @@ def run(arguments: Sequence[str]) -> None:
 
         run_real(asked, task, arm, bundle)
         return
-    names = [asked.controller] + ([] if asked.against == "none" or asked.dry_run else [asked.against])
-    _show(asked, [_simulated(asked, task, arm, bundle.folder, name) for name in dict.fromkeys(names)])
+    names = [asked.controller] + ([] if asked.against == "none" else [asked.against])
+    runs = [_simulated(asked, task, arm, bundle.folder, name) for name in dict.fromkeys(names)]
+    _show(asked, runs, shlex.join(["contactsafe", "run", *arguments]))
 
 
 def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str) -> RobotRun:
@@ -151,8 +158,8 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
     robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
     try:
         with robot:
-            said = {"robot": "fr3", "task": asked.task, "controller": controller, "seed": str(asked.seed)}
-            parts = parts_of(asked, arm, bundle, simulated.work, controller, LOOPBACK, folder / LOG, said)
+            said = said_of(asked, controller) | {"seed": str(asked.seed)}
+            parts = parts_of(asked, arm, bundle, simulated.work, controller, robot.address, folder / LOG, said)
             ending = run_crew(exchange, parts, asked.seconds, StatusLine())
         truth = np.load(folder / TRUTH)
         return RobotRun(controller, truth, ending, simulated.figures(truth), bool(simulated.scene.pushes))
@@ -161,12 +168,16 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
         simulated.close()
 
 
+def said_of(asked: Options, controller: str) -> dict[str, str]:
+    """Return what a log says of its run: all that is needed to compute its torques again."""
+    calibrated = {} if asked.calibration is None else {"calibration": str(asked.calibration.resolve())}
+    return {"robot": "fr3", "task": asked.task, "controller": controller, **calibrated}
+
+
 def parts_of(
     asked: Options, arm: Arm, bundle: Path, work: Work, controller: str, address: str, log: Path, said: dict[str, str]
 ) -> list[Part]:
     """Return the processes of a run."""
-    from contactsafe.hardware.realtime import Realtime
-
     rights = Realtime(0 if asked.lockstep else asked.priority)
     port = FrankaPort(address, load_of(arm))
     settings = ControlSettings(arm, presets.by_name(controller), port, asked.lockstep, rights)
@@ -181,16 +192,16 @@ def parts_of(
 
 
 def load_of(arm: Arm) -> tuple[float, np.ndarray, np.ndarray] | None:
-    """Return what the tool adds to the hand that the robot's own settings know: mass, centre in the flange, inertia."""
-    from contactsafe.robot.franka import HAND
+    """Return what the tool adds to the hand that the robot's own settings know, None for nothing.
 
-    tool = arm.tool
-    extra = 0.0 if tool is None else tool.inertia.mass - HAND.inertia.mass
-    if tool is None or extra <= 1e-3:
+    Returns:
+        Mass, kg, its centre, (3,), m, and inertia about that, (3, 3), kg m², both in the flange's frame.
+    """
+    description, tool = description_and_tool(arm)
+    if tool.inertia.mass - HAND.inertia.mass <= _LEAST_KG:
         return None
-    mass, hand = tool.inertia.mass, HAND.inertia
-    centre = (mass * np.array(tool.inertia.com) - hand.mass * np.array(hand.com)) / extra
-    return extra, centre, np.zeros((3, 3))
+    load, R = tool.inertia - HAND.inertia, quat_to_matrix(np.array(description.mount_quat))
+    return load.mass, R @ np.array(load.com), R @ load.matrix() @ R.T
 
 
 class StatusLine(Unique):
@@ -219,9 +230,9 @@ class StatusLine(Unique):
         print(f"\r{line:110s}" if self._live else line, end="" if self._live else "\n", file=sys.stderr, flush=True)
 
 
-def _show(asked: Options, runs: Sequence[RobotRun]) -> None:
+def _show(asked: Options, runs: Sequence[RobotRun], command: str) -> None:
     """Print the figures, write the page, and fail where a run did not end as it should."""
-    results, info = [robot_runs(runs, asked.seed)], {"seeds": [asked.seed], "command": "contactsafe run --simulated"}
+    results, info = [robot_runs(runs, asked.seed)], {"seeds": [asked.seed], "command": command}
     page = write_report(asked.out, results, info, WORDS)
     print(to_json(summarise(results, info)) if asked.json else terminal_table(results))
     print(f"report: {page}", file=sys.stderr)

@@ -1,5 +1,6 @@
 """The control loop in Python: everything is compiled and allocated before, then it runs at the robot's rate."""
 
+import contextlib
 import gc
 import time
 from dataclasses import dataclass, field
@@ -15,8 +16,7 @@ from contactsafe.core.copying import Unique
 from contactsafe.hardware import realtime
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.loop import loop_dtype, turn
-from contactsafe.hardware.messages import as_words
-from contactsafe.hardware.port import RobotPort
+from contactsafe.hardware.port import RobotError, RobotPort
 from contactsafe.hardware.states import IDLE, RUNNING
 from contactsafe.hardware.status import BUSY_BINS
 from contactsafe.robot.arm import Arm
@@ -44,9 +44,13 @@ class ControlSettings:
     rights: realtime.Realtime = field(default_factory=realtime.Realtime)
 
 
+_RATE = 0.9
+"""Of what a robot lets a torque change in a tick, that is used."""
+
+
 def for_robot(config: ControllerConfig) -> ControllerConfig:
     """Return a configuration for a robot that adds gravity and its motors' friction itself, and checks torque rates."""
-    return config.with_(friction_compensation=False, torque_rate_fraction=0.9)
+    return config.with_(friction_compensation=False, torque_rate_fraction=_RATE)
 
 
 class ControlLoop(Unique):
@@ -64,7 +68,6 @@ class ControlLoop(Unique):
         n = settings.arm.n
         self.controller = Controller(settings.arm, for_robot(settings.config))
         self.loops = np.zeros(1, loop_dtype(n))
-        self._message, self._seen = as_words(self.loops["message"].copy()), None
         self._reading = self.loops["reading"]
         self._arguments: Any = ()
         self._bind()
@@ -102,7 +105,7 @@ class ControlLoop(Unique):
         controller.reset(q, qd)
         controller.set_target(Target(arm.tool_pose(q), _STIFFNESS, None, q))
         self.loops[:] = np.zeros((), self.loops.dtype)
-        self.loops["step_limit"] = 0.9 * self.port.torque_rate
+        self.loops["step_limit"] = _RATE * self.port.torque_rate
         self.loops["gate"]["state"] = RUNNING
         reading = self._reading
         reading["q"], reading["qd"] = q, qd
@@ -119,7 +122,11 @@ class ControlLoop(Unique):
         gc.disable()
         port.begin()
         status["state"] = RUNNING
-        self._cycle()
+        try:
+            self._cycle()
+        finally:
+            with contextlib.suppress(RobotError):  # whatever happened: a robot that is still there holds itself
+                port.finish()
 
     def _note_beginning(self) -> None:
         """Put where the run begins into the recorder's ring, as tick 0."""
@@ -149,7 +156,6 @@ class ControlLoop(Unique):
             busy[min(spent // 1000, BUSY_BINS - 1)] += 1
             if passed > 1 and ticks[0] > 1:
                 lost[0] += passed - 1
-        port.finish()
 
     def _wait_for_policy(self) -> None:
         """Wait until the policy has seen this tick, where a run is to be the same again."""

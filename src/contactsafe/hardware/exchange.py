@@ -7,6 +7,7 @@ command where that has died.
 import contextlib
 import mmap
 import os
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -72,12 +73,12 @@ class Exchange(Unique):
         Raises:
             OutputError: there is no room for it.
         """
-        path = FOLDER / f"{PREFIX}{os.getpid()}"
         size = _offsets(n)["end"]
         try:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+            handle, name = tempfile.mkstemp(prefix=f"{PREFIX}{os.getpid()}-", dir=FOLDER)
         except OSError as error:
-            raise OutputError(f"{path} cannot be made ({error.strerror}); a run needs {size >> 20} MB there") from None
+            raise OutputError(f"{FOLDER} takes no file ({error.strerror}); a run needs {size >> 20} MB there") from None
+        path = Path(name)
         try:
             os.posix_fallocate(handle, 0, size)
             os.pwrite(handle, np.array([n], np.int64).tobytes(), status_dtype.fields["joints"][1])  # type: ignore[index]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.hardware.port import RobotError
+from contactsafe.hardware.port import RobotError, RobotSilentError
 
 COLLISION_NM, COLLISION_N = 60.0, 100.0
 """Torques and forces of contact from which the robot stops by itself: beyond what this controller lets a contact have
@@ -106,17 +106,14 @@ class FrankaPort:
             self._control.writeOnce(last)
         self._control = None
 
-    def recover(self) -> None:
-        """Clear errors, as the robot lets a program do."""
-        with _named(self._library):
-            self._robot.automatic_error_recovery()
-
     def close(self) -> None:
         """Let go of the connection; a motion that runs is ended by the robot."""
         self._control = self._robot = None
 
     def errors(self) -> tuple[str, ...]:
         """Return the errors that the robot reports now, by libfranka's names."""
+        if self._robot is None:
+            return ()
         with contextlib.suppress(RobotError), _named(self._library):
             state = self._robot.read_once()
             return error_names(state.current_errors) or error_names(state.last_motion_errors)
@@ -134,8 +131,14 @@ def _named(library: Any) -> Any:
     """Raise what the library raises as a `RobotError` with libfranka's names of what went wrong."""
     try:
         yield
+    except library.NetworkException as error:
+        raise RobotSilentError((), _line(error)) from None
     except (library.FrankaException, RuntimeError, ValueError) as error:
-        raise RobotError(_names_in(str(error)), " ".join(str(error).split())[:300]) from None
+        raise RobotError(_names_in(str(error)), _line(error)) from None
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]
 
 
 def _names_in(text: str) -> tuple[str, ...]:

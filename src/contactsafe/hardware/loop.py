@@ -15,7 +15,7 @@ from contactsafe.core.linalg import dot
 from contactsafe.hardware.gate import admit, follow_state, gate_dtype
 from contactsafe.hardware.mailbox import publish, receive
 from contactsafe.hardware.messages import message_dtype, reading_dtype, seen_dtype
-from contactsafe.hardware.states import BRAKED, FAULT, HELD, RUNNING, STOPPING, TIME_UP, WATCHDOG_SILENT
+from contactsafe.hardware.states import BRAKED, FAULT, STOPPING, TIME_UP, WATCHDOG_SILENT
 
 _f = np.float64
 _i = np.int64
@@ -28,9 +28,6 @@ _REST_M_S, _REST_RAD_S, _REST_TICKS = 0.005, 0.02, 100
 
 _AT_MOST_TICKS = 2000
 """After so long the robot is let go of though the arm does not rest, to be held by its own controller."""
-
-_STEP = 0.9
-"""Of what the robot lets a torque change in a tick, that is used."""
 
 
 @functools.cache
@@ -172,8 +169,3 @@ def _record(c: Record, loop: Record, status: Record, rows: np.ndarray) -> None:
     row.reading, row.measurement, row.target, row.output = loop.reading, c.measurement, c.target, c.output
     row.sent[:] = loop.sent
     status.rows += 1
-
-
-def is_running(state: int) -> bool:
-    """Tell whether a run in this state goes on, or may."""
-    return state in (RUNNING, HELD)

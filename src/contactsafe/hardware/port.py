@@ -20,6 +20,10 @@ class RobotError(ContactSafeError):
         self.names = names
 
 
+class RobotSilentError(RobotError):
+    """Nothing comes from the robot any more, or it cannot be reached."""
+
+
 class RobotPort(Protocol):
     """A torque-controlled robot of one kind.
 
@@ -53,8 +57,8 @@ class RobotPort(Protocol):
         """Give control back: the robot holds itself."""
         ...
 
-    def recover(self) -> None:
-        """Clear what errors it may clear by itself."""
+    def errors(self) -> tuple[str, ...]:
+        """Return the errors that the robot reports now, as it calls them; none where it does not answer."""
         ...
 
     def close(self) -> None:

@@ -61,6 +61,10 @@ class Inertia:
             total += part.matrix() + point_tensor(part.mass, np.array(part.com) - com)
         return Inertia.of(mass, com, total)
 
+    def __sub__(self, part: "Inertia") -> "Inertia":
+        """Return what is left of a body without one of its parts."""
+        return self + Inertia.of(-part.mass, np.array(part.com), -part.matrix())
+
 
 def point_tensor(mass: float, at: np.ndarray) -> np.ndarray:
     """Return the tensor of a point mass, kg, at a place (3,), m, about the origin: m (c·c I − c cᵀ), (3, 3), kg m²."""

@@ -21,6 +21,9 @@ class SimulatedRobot(Unique):
 
     Args:
         scene, home, lockstep, effect, truth: as `contactsafe.sim.franka_server.serve` takes them.
+
+    Attributes:
+        address: that it listens at, once it does.
     """
 
     _why = "a simulated robot is a process; make another one"
@@ -34,6 +37,7 @@ class SimulatedRobot(Unique):
         truth: Path | None = None,
     ):
         self._context = multiprocessing.get_context("spawn")
+        self.address = ""
         self._told: Connection
         self._told, theirs = self._context.Pipe()
         arguments = (scene, home, lockstep, effect, theirs, truth)
@@ -42,7 +46,8 @@ class SimulatedRobot(Unique):
     def __enter__(self) -> "SimulatedRobot":
         self.process.start()
         said = self._told.recv() if self._told.poll(_READY_S) else "it did not get ready"
-        if said != "ready":
+        ready, _, self.address = said.partition(" ")
+        if ready != "ready":
             self.process.kill()
             raise InvalidInputError(f"simulated robot: {said}")
         return self

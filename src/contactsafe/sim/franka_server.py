@@ -21,6 +21,9 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.franka import HAND
 from contactsafe.sim.franka_scene import OBSTACLE, TIP, FrankaScene, add_fixtures, add_obstacles, add_tip
 
+ADDRESSES = tuple(f"127.0.0.{number}" for number in range(1, 33))
+"""Of this machine alone, at which simulated robots listen."""
+
 _TICK_S = 0.001
 _BEHIND_S = 0.02  # more than this behind, it starts counting anew instead of catching up
 _PATIENCE_S = 30.0  # for a command, in lockstep
@@ -59,13 +62,15 @@ class SimulatedFranka(Unique):
     Args:
         scene: as given.
         home: joint positions to begin with, (7,), rad.
-        address: that it listens at; keep to this machine.
         effect: of the tool, or None.
+
+    Attributes:
+        address: of this machine, that it listens at: 127.0.0.1, or the next one where that is taken.
     """
 
     _why = "a simulated robot listens at one address; make another one"
 
-    def __init__(self, scene: FrankaScene, home: np.ndarray, address: str = "127.0.0.1", effect: Effect | None = None):
+    def __init__(self, scene: FrankaScene, home: np.ndarray, effect: Effect | None = None):
         try:
             import franky_sim
             from franky_sim.base_simulator import InnerRobotState
@@ -80,12 +85,14 @@ class SimulatedFranka(Unique):
         add_tip(hand, scene, HAND.inertia.mass)
         add_fixtures(sim.worldbody, scene.fixtures)
         add_obstacles(sim.worldbody, scene.obstacles)
-        self._server = franky_sim.SimulationServer(sim, hostname_candidates=[address])
+        self._server = franky_sim.SimulationServer(sim, hostname_candidates=ADDRESSES)
         try:
             self._server.init()
         except OSError as error:
-            raise InvalidInputError(f"nothing can listen at {address}: {error}; is another robot simulated?") from None
+            where = f"{ADDRESSES[0]} to {ADDRESSES[-1]}"
+            raise InvalidInputError(f"nothing can listen at {where}: {error}; end other simulated robots") from None
         self._protocol = self._server.robot_servers[0]
+        self.address = str(self._protocol.hostname)
         self.model, self.data = sim.model, sim.data
         self.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE  # MuJoCo 4.0.0 errs with sparse ones
         self._q, self._dof = np.array(self._robot._qpos_addrs), np.array(self._robot._dof_addrs)
@@ -123,11 +130,6 @@ class SimulatedFranka(Unique):
         """Let the torque sensor show what holds the arm at home."""
         mujoco.mj_forward(self.model, self.data)
         self._link_torque[:] = self.data.qfrc_bias[self._dof]
-
-    @property
-    def connected(self) -> bool:
-        """Whether somebody is connected."""
-        return bool(self._protocol.tcp_connected)
 
     @property
     def is_controlled(self) -> bool:
@@ -242,7 +244,7 @@ def serve(
     Args:
         scene, home, effect: as `SimulatedFranka` takes them.
         lockstep: it waits for each command, and time is counted in ticks; otherwise it keeps to the clock.
-        told: "ready" or what is wrong goes out; anything that comes in ends it.
+        told: "ready" and its address, or what is wrong goes out; anything that comes in ends it.
         truth: file for what happened, .npy; None for none.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -252,7 +254,7 @@ def serve(
     except InvalidInputError as error:
         told.send(str(error))
         return
-    told.send("ready")
+    told.send(f"ready {robot.address}")
     due, turns = time.perf_counter(), 0
     while True:
         robot.tick(lockstep)

@@ -8,6 +8,8 @@ from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.vision.opencv import cv2
 
+_GREY = 90  # of what stands about the board
+
 
 @dataclass(frozen=True)
 class Lens:
@@ -49,15 +51,18 @@ class Square(Independent):
         lens: of the camera.
         size: pixels along an edge of the photograph.
         focal_px: its focal length, pixels.
+
+    Attributes:
+        matrix: OpenCV's camera matrix of the photograph, (3, 3).
     """
 
     def __init__(self, lens: Lens, size: int, focal_px: float):
         self.lens, self.size = lens, size
         middle = (size - 1) / 2.0
-        self._matrix = np.array([[focal_px, 0.0, middle], [0.0, focal_px, middle], [0.0, 0.0, 1.0]])
+        self.matrix = np.array([[focal_px, 0.0, middle], [0.0, focal_px, middle], [0.0, 0.0, 1.0]])
         distortion = np.array(lens.distortion)
         self._maps = cv2.initUndistortRectifyMap(
-            lens.matrix, distortion, np.eye(3), self._matrix, (size, size), cv2.CV_32FC1
+            lens.matrix, distortion, np.eye(3), self.matrix, (size, size), cv2.CV_16SC2
         )
 
     def cut(self, picture: np.ndarray) -> np.ndarray:
@@ -83,15 +88,21 @@ class Distorted(Independent):
     """
 
     def __init__(self, square: Square):
-        lens = square.lens
+        lens, size = square.lens, square.size
         columns, rows = np.meshgrid(np.arange(lens.width, dtype=np.float32), np.arange(lens.height, dtype=np.float32))
         seen = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
-        straight = cv2.undistortPoints(seen, lens.matrix, np.array(lens.distortion), P=square._matrix)[:, 0]
-        shape = (lens.height, lens.width)
-        self._maps = straight[:, 0].reshape(shape).astype(np.float32), straight[:, 1].reshape(shape).astype(np.float32)
+        straight = cv2.undistortPoints(seen, lens.matrix, np.array(lens.distortion), P=square.matrix)[:, 0]
+        u, v = (straight[:, k].reshape(lens.height, lens.width).astype(np.float32) for k in (0, 1))
+        reached = (u > -1.0) & (u < size) & (v > -1.0) & (v < size)
+        places = np.nonzero(reached)
+        self._window = tuple(slice(int(place.min()), int(place.max()) + 1) for place in places)
+        self._maps = cv2.convertMaps(u[self._window], v[self._window], cv2.CV_16SC2)
+        self._grey = np.full((lens.height, lens.width, 3), _GREY, np.uint8)
 
     def picture(self, photograph: np.ndarray) -> np.ndarray:
         """Return the camera's picture, uint8 (height, width, 3); grey where the photograph does not reach."""
-        return cv2.remap(
-            photograph, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(90, 90, 90)
+        picture = self._grey.copy()
+        picture[self._window] = cv2.remap(
+            photograph, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(_GREY,) * 3
         )
+        return picture

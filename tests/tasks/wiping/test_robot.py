@@ -74,8 +74,6 @@ def test_the_first_board_is_drawn_when_it_is_to_be(shown, arm):
 
 def test_what_the_camera_shows_becomes_the_mask_that_training_had(shown, arm):
     """Through lens, sensor interface, undistortion and segmentation: the pixels of ink are those of the board."""
-    from contactsafe.sim.config import WorldConfig
-    from contactsafe.sim.scene import build_plant
     from contactsafe.tasks.wiping.camera import plane_homography
     from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard
 
@@ -100,7 +98,6 @@ def test_what_the_camera_shows_becomes_the_mask_that_training_had(shown, arm):
         for du in (-1, 0, 1):
             around |= np.roll(truth, (dv, du), (0, 1))
     assert (found & ~around).sum() == 0
-    assert build_plant(arm, WorldConfig(fixtures=())).ngeom > 0
 
 
 class Shown:
