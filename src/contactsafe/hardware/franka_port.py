@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.hardware import realtime
 from contactsafe.hardware.port import RobotError, RobotSilentError
 
 COLLISION_NM, COLLISION_N = 60.0, 100.0
@@ -53,7 +54,7 @@ class FrankaPort:
 
     def connect(self) -> None:
         """Reach the robot; raise what it takes for a collision, tell it the load."""
-        with _named(self._library):
+        with _named(self._library), realtime.kept():
             self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
             torques, forces = [COLLISION_NM] * 7, [COLLISION_N] * 6
             self._robot.set_collision_behavior(torques, torques, forces, forces)
@@ -69,7 +70,7 @@ class FrankaPort:
     def begin(self) -> None:
         """Take control; its time begins with the first state."""
         self._first_ms = None
-        with _named(self._library):
+        with _named(self._library), realtime.kept():
             self._control = self._robot.start_torque_control()
 
     def read(self, reading: np.ndarray) -> int:

@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
@@ -39,6 +41,16 @@ def apply(wanted: Realtime) -> list[str]:
         f"control: the system does not grant {', '.join(refused)}; ticks may come late under load (see the how-to of "
         "real robots)"
     ]
+
+
+@contextmanager
+def kept() -> Iterator[None]:
+    """Keep this thread's priority as it is: libfranka takes the highest, and child processes inherit it."""
+    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, policy, priority)
 
 
 def _lock_memory() -> None:

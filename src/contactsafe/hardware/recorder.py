@@ -111,12 +111,13 @@ def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     status["pid_recorder"] = os.getpid()
     try:
         recorder = Recorder(exchange, path, run)
-        beat, heard = -1, time.monotonic()
+        beats, heard = (-1, -1), time.monotonic()
         while not status["finished"][0] and time.monotonic() - heard < _ALONE_S:
             status["beat_recorder"] += 1
             recorder.drain()
-            if status["beat_watchdog"][0] != beat:
-                beat, heard = int(status["beat_watchdog"][0]), time.monotonic()
+            now = int(status["beat_watchdog"][0]), int(status["beat_command"][0])
+            if now != beats:
+                beats, heard = now, time.monotonic()
             time.sleep(_EVERY_S)
         recorder.drain()
         recorder.finish()

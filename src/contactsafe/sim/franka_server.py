@@ -27,6 +27,7 @@ ADDRESSES = tuple(f"127.0.0.{number}" for number in range(1, 33))
 _TICK_S = 0.001
 _BEHIND_S = 0.02  # more than this behind, it starts counting anew instead of catching up
 _PATIENCE_S = 30.0  # for a command, in lockstep
+_AGAIN_S = 0.2  # after so long without a first command a state is sent again: libfranka skips all but the newest
 _FRICTION = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
 _UNTIL_ALONE = 100  # ticks between looks whether whoever began this still lives
 
@@ -107,7 +108,7 @@ class SimulatedFranka(Unique):
         self._find_bodies()
         self._settle()
         self.ticks = 0
-        self.begun = self._awaits_command = False
+        self.begun = self._awaits_command = self._answers = False
         self._truth: list[np.ndarray] = []
         if effect is not None:
             effect.begin(self.model)
@@ -143,11 +144,13 @@ class SimulatedFranka(Unique):
     def tick(self, lockstep: bool) -> None:
         """Take commands, advance by a millisecond, send the state; where in lockstep, wait for the command first."""
         protocol = self._protocol
-        if lockstep and self.is_controlled:
-            if self._awaits_command:
-                select.select([protocol._FrankaServer__udp_socket, protocol._tcp_socket], [], [], _PATIENCE_S)
-            self._awaits_command = True
+        is_controlled = lockstep and self.is_controlled
+        if is_controlled and self._awaits_command:
+            patience = _PATIENCE_S if self._answers else _AGAIN_S
+            select.select([protocol._FrankaServer__udp_socket, protocol._tcp_socket], [], [], patience)
+        self._awaits_command = is_controlled
         protocol.process_commands()
+        self._answers = self.is_controlled and (self._answers or self._is_commanded)
         if not self.begun:
             self.begun = self.is_controlled and self._is_commanded
             if not self.begun:
@@ -156,14 +159,14 @@ class SimulatedFranka(Unique):
             self._touch()
             self._take_friction_off()
         self._sim.step()
-        self._sense()
         if self.begun:
+            self._sense()
             self._note()
             self.ticks += 1
         protocol.send_state()
 
     def _freeze(self) -> None:
-        """Stay as at the beginning until the first command."""
+        """Stay as at the beginning until the first command; the torque sensor shows what `_settle` left."""
         data = self.data
         data.qpos[:], data.qvel[:], data.qacc_warmstart[:], data.qfrc_applied[:] = self._home, 0.0, 0.0, 0.0
         mujoco.mj_forward(self.model, data)

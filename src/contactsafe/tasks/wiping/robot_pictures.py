@@ -28,6 +28,13 @@ def focal_px(camera: Camera) -> float:
     return camera.focal_px * PHOTO_PX / camera.size
 
 
+def _opened(source: ColourCamera | None) -> ColourCamera:
+    """Return a camera that was opened; asking for pictures before that is a mistake of the program."""
+    if source is None:
+        raise RuntimeError("the camera was not opened")
+    return source
+
+
 class CameraPictures:
     """Photographs of a RealSense camera that stands where the policy's camera was in training.
 
@@ -38,12 +45,13 @@ class CameraPictures:
 
     def __init__(self, serial: str | None, camera: Camera):
         self._serial, self._camera = serial, camera
+        self._source: ColourCamera | None = None
 
     def open(self) -> None:
         """Open it, and take over what its device knows of its lens."""
-        self._source = ColourCamera(self._serial)
-        self._source.open()
-        lens = self._source.intrinsics
+        self._source = source = ColourCamera(self._serial)
+        source.open()
+        lens = source.intrinsics
         known = Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, tuple(lens.coeffs))
         self._square = Square(known, PHOTO_PX, focal_px(self._camera))
         self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
@@ -51,9 +59,10 @@ class CameraPictures:
     def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
         """Return the newest photograph; one that is gone is looked for again."""
         del tick
-        picture, number, age_ms = self._source.newest()
+        source = _opened(self._source)
+        picture, number, age_ms = source.newest()
         if picture is None or age_ms > _WAIT_MS:
-            self._source.look_again()
+            source.look_again()
             return self._photo, self._number, math.inf if picture is None else age_ms
         if number != self._number:
             self._photo, self._number = self._square.cut(picture), number
@@ -61,7 +70,8 @@ class CameraPictures:
 
     def close(self) -> None:
         """Let go of it."""
-        self._source.close()
+        if self._source is not None:
+            self._source.close()
 
 
 class PhotographedBoard:
@@ -76,6 +86,7 @@ class PhotographedBoard:
 
     def __init__(self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int):
         self._path, self._arm, self._board, self._camera, self._seed = path, arm, board, camera, seed
+        self._source: ColourCamera | None = None
 
     def open(self) -> None:
         """Map what the board shows, and start the camera."""
@@ -96,11 +107,12 @@ class PhotographedBoard:
             solids = self._photographer.solids_at(shown["q"].copy())
             photograph = self._photographer.take(shown["cells"], solids, self._seed, number)
             self._device.give(self._distorted.picture(photograph), number, 1000.0 * number / 30.0)
-            picture, self._number, _ = self._source.newest(_WAIT_MS)
+            picture, self._number, _ = _opened(self._source).newest(_WAIT_MS)
             if picture is not None:
                 self._photo = self._square.cut(picture)
         return self._photo, self._number, float(tick - number * _EVERY_TICKS)
 
     def close(self) -> None:
         """Stop the camera."""
-        self._source.close()
+        if self._source is not None:
+            self._source.close()

@@ -12,6 +12,7 @@ from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.vision.opencv import keep_to_one_thread
 from contactsafe.vision.segment import Segmenter
 
 _START_M = 0.06
@@ -82,6 +83,7 @@ class WipingWork:
     def prepare(self, arm: Arm, lockstep: bool) -> None:
         """Open the camera."""
         del lockstep
+        keep_to_one_thread()
         self._eye = Photographer(self.camera, self.board, build_plant(arm, WorldConfig(fixtures=())))
         self._segmenter = Segmenter(self._eye.homography, self._eye.corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
