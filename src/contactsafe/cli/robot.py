@@ -71,6 +71,7 @@ class Options:
         rounds: of work, such as boards, after which a simulated run ends.
         speed: factor on how fast the target moves, 0.05 to 1.
         camera: serial number of the RealSense; the first one found where it is not given.
+        recover: acknowledge the error that stopped the robot before; look at what stopped it first.
         dry_run: look at the robot, print the checklist, move nothing.
         yes: do not ask before the robot moves.
         alone: nothing pushes or meets the simulated arm.
@@ -92,6 +93,7 @@ class Options:
     rounds: int = 3
     speed: float = 1.0
     camera: str | None = None
+    recover: bool = False
     dry_run: bool = False
     yes: bool = False
     alone: bool = False
@@ -114,8 +116,8 @@ class Options:
             raise InvalidInputError(f"rounds = {self.rounds}; give 1 to 60")
         if not 0 <= self.priority <= 99:
             raise InvalidInputError(f"priority = {self.priority}; give 1 to 99, or 0 for none")
-        if self.simulated and self.dry_run:
-            raise InvalidInputError("dry_run is for real robots; a simulated one may move")
+        if self.simulated and (self.dry_run or self.recover):
+            raise InvalidInputError("dry_run and recover are for real robots; a simulated one may move")
         if self.robot is not None and self.lockstep:
             raise InvalidInputError("lockstep is for simulated robots; a real one does not wait")
 
