@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from contactsafe.cli.robot import LOG, Options, StatusLine, load_of, parts_of, refuse_failed, said_of
+from contactsafe.cli.robot import ARMS, LOG, Options, StatusLine, load_of, parts_of, refuse_failed, said_of
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.hardware.crew import run_crew
 from contactsafe.hardware.exchange import Exchange
-from contactsafe.hardware.franka_port import COLLISION_N, COLLISION_NM, FrankaPort
+from contactsafe.hardware.franka_port import COLLISION_N, COLLISION_NM
 from contactsafe.hardware.messages import reading_dtype
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.work import Work
@@ -47,7 +47,7 @@ def run_real(asked: Options, task: Any, arm: Arm, bundle: Bundle) -> None:
 
 def look(asked: Options, arm: Arm) -> np.void:
     """Return what the robot says of itself, at rest."""
-    port, reading = FrankaPort(str(asked.robot), load_of(arm)), np.zeros(1, reading_dtype(arm.n))
+    port, reading = ARMS[asked.arm][1](str(asked.robot), load_of(arm)), np.zeros(1, reading_dtype(arm.n))
     try:
         port.connect()
         if asked.recover:

@@ -17,6 +17,8 @@ on an arm (30 N m, and what an impact adds), short of what breaks the arm."""
 _RATE_NM = 1.0
 """A tick's change of torque that Franka's interface allows, N m: 1000 N m/s."""
 
+_SILENT = "UDP receive"  # in the message of a library that does not tell errors of the network from others
+
 _MISSING = "pylibfranka is not installed; install contactsafe[franka]"
 
 
@@ -39,7 +41,7 @@ class FrankaPort:
     """
 
     def __init__(self, address: str, load: tuple[float, np.ndarray, np.ndarray] | None = None):
-        _library()
+        _ = self._library
         self._address, self._load = address, load
         self._robot: Any = None
         self._control: Any = None
@@ -83,7 +85,7 @@ class FrankaPort:
         try:
             state, passed = self._control.readOnce()
         except Exception as error:
-            raise _as_ours(self._library, error) from None
+            raise as_ours(self._library, error) from None
         self._fill(reading, state)
         return round(1000.0 * passed.to_sec())
 
@@ -106,7 +108,7 @@ class FrankaPort:
         try:
             self._control.writeOnce(self._library.Torques(torque.tolist()))
         except Exception as error:
-            raise _as_ours(self._library, error) from None
+            raise as_ours(self._library, error) from None
 
     def finish(self) -> None:
         """End the motion: the robot holds itself."""
@@ -142,14 +144,16 @@ def _named(library: Any) -> Any:
     try:
         yield
     except Exception as error:
-        raise _as_ours(library, error) from None
+        raise as_ours(library, error) from None
 
 
-def _as_ours(library: Any, error: Exception) -> Exception:
+def as_ours(library: Any, error: Exception) -> Exception:
     """Return what the library raised as a `RobotError`; what is none of its errors as it is."""
-    if isinstance(error, library.NetworkException):
+    kinds = (getattr(library, "FrankaException", RuntimeError), RuntimeError, ValueError)
+    silent = getattr(library, "NetworkException", ())
+    if isinstance(error, silent) or (isinstance(error, kinds) and _SILENT in str(error)):
         return RobotSilentError((), _line(error))
-    if isinstance(error, library.FrankaException | RuntimeError | ValueError):
+    if isinstance(error, kinds):
         return RobotError(_names_in(str(error)), _line(error))
     return error
 
