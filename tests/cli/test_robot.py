@@ -22,7 +22,7 @@ from contactsafe.tasks.insertion.robot import InsertionRobot
     (["--simulated", "--speed", "3"], "give 0.05 to 1"),
     (["--simulated", "--rounds", "0"], "give 1 to 60"),
     (["--simulated", "--priority", "200"], "give 1 to 99"),
-    (["--simulated", "--dry-run"], "dry_run is for real robots"),
+    (["--simulated", "--dry-run"], "dry_run and recover are for real robots"),
     (["--robot", "172.16.0.2", "--lockstep"], "lockstep is for simulated robots"),
     (["--simulated", "--task", "insertion", "nowhere"], "no bundle at nowhere"),
 ])  # fmt: skip

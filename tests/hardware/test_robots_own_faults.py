@@ -1,7 +1,6 @@
 """What stops a Franka by itself, from a simulator that enforces it, in an environment of its own."""
 
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -20,6 +19,7 @@ from contactsafe.hardware.crew import Part, run_crew
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.franka_port import FrankaPort
 from contactsafe.hardware.messages import reading_dtype
+from contactsafe.hardware.port import RobotError
 from contactsafe.hardware.watchdog import watch
 from contactsafe.robot import robots
 
@@ -28,7 +28,7 @@ franky_sim = pytest.importorskip("franky_sim")
 
 pytestmark = pytest.mark.slow
 
-ADDRESS, PORT, WANTED = "127.0.0.1", 1337, "franka-sim==1.1.7"
+ADDRESS, WANTED = "127.0.0.1", "franka-sim==1.1.7"
 SERVER = """
 import logging
 from franka_sim.franka_sim_server import FrankaSimServer
@@ -54,11 +54,24 @@ def python(tmp_path_factory):
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     """Copy franky-sim's arm with its meshes found from anywhere."""
-    (found,) = Path(franky_sim.__file__).parent.rglob("fr3.xml")
-    text, copy = found.read_text(), tmp_path_factory.mktemp("model") / "fr3.xml"
+    package, copy = Path(franky_sim.__file__).parent, tmp_path_factory.mktemp("model") / "fr3.xml"
+    (found,), mesh = package.rglob("fr3.xml"), next(package.rglob("link0_0_vis.obj"))
+    text = found.read_text()
     folder = text.partition('meshdir="')[2].partition('"')[0]
-    copy.write_text(text.replace(f'meshdir="{folder}"', f'meshdir="{(found.parent / folder).resolve()}"'))
+    copy.write_text(text.replace(f'meshdir="{folder}"', f'meshdir="{mesh.parent}"'))
     return copy
+
+
+def answers():
+    """Tell whether there is a robot; asked as a robot is, since a simulator takes any connection for a client."""
+    port = FrankaPort(ADDRESS)
+    try:
+        port.connect()
+    except RobotError:
+        return False
+    finally:
+        port.close()
+    return True
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +81,7 @@ def simulator(python, model, tmp_path_factory):
         process = subprocess.Popen([python, "-c", SERVER], env={**os.environ, "FR3_MJCF": str(model), "PYTHONPATH": ""},
                                    stdout=file, stderr=file)  # fmt: skip
     until = time.monotonic() + 60.0
-    while socket.socket().connect_ex((ADDRESS, PORT)) != 0:
+    while not answers():
         assert process.poll() is None, said.read_text()
         assert time.monotonic() < until
         time.sleep(0.2)

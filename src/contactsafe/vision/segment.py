@@ -1,4 +1,7 @@
-"""Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together."""
+"""Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together.
+
+What is too faint or too thin for that is still ink where it is a line: darker than both its sides, and long.
+"""
 
 from dataclasses import dataclass
 
@@ -12,6 +15,8 @@ INK_PIXEL, OTHER_PIXEL = 0, 255
 
 _COARSE = 4  # photograph's pixels along an edge of one of the background's
 _WINDOW = 5  # of the background's pixels: strokes and blobs must be narrower, shadows wider
+_LINE_BLUR_PX = 1.2
+_LINE_WIDTH_PX = 1.7  # of a thin line's core, in the mean
 _DEEPEST = 0.20  # fraction of the board's brightness that is left in the darkest shadow
 
 
@@ -25,6 +30,9 @@ class InkThresholds:
         sharp: change of brightness from one pixel to those around it, as a fraction of the board's.
         least_px: of the photograph's pixels, the fewest that make a speck.
         covered: fraction of a mask's pixel, covered by ink, that marks it.
+        line: a pixel this fraction darker than both sides of a line may be ink, where the line is long.
+        clear_line: a line has a pixel this much darker.
+        line_px: of the photograph's pixels, how long a line is at least; half as many are as wide as one is at most.
         rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
     """
 
@@ -33,6 +41,9 @@ class InkThresholds:
     sharp: float = 0.12
     least_px: int = 3
     covered: float = 0.10
+    line: float = 0.03
+    clear_line: float = 0.045
+    line_px: int = 14
     rim_px: int = 3
 
 
@@ -131,6 +142,24 @@ class Segmenter:
         kept = np.zeros(count, np.uint8)
         kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
         kept[stats[:, cv2.CC_STAT_AREA] < self.ink.least_px] = 0
+        ink = self._lines(evened, seen, int(middle))
+        ink.ravel()[places] |= kept[names]
+        return ink
+
+    def _lines(self, evened: np.ndarray, seen: np.ndarray, middle: int) -> np.ndarray:
+        """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
+        smooth = cv2.GaussianBlur(evened, (5, 5), _LINE_BLUR_PX)
+        smooth[seen == 0] = middle
+        hollow = cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8))
+        usual, noise = _middle_and_spread(hollow, seen)
+        candidates = cv2.bitwise_and((hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)).view(np.uint8), seen)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
+        places = np.flatnonzero(candidates)
+        names = labels.ravel()[places]
+        kept = np.zeros(count, np.uint8)
+        kept[names[hollow.ravel()[places] > max(usual + 7 * noise, _BRIGHT * self.ink.clear_line)]] = 255
+        kept[stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1) < self.ink.line_px] = 0
+        kept[stats[:, cv2.CC_STAT_AREA] < _LINE_WIDTH_PX * self.ink.line_px] = 0
         ink = np.zeros_like(evened)
         ink.ravel()[places] = kept[names]
         return ink
