@@ -17,6 +17,7 @@ _COARSE = 4  # photograph's pixels along an edge of one of the background's
 _WINDOW = 5  # of the background's pixels: strokes and blobs must be narrower, shadows wider
 _LINE_BLUR_PX = 1.2
 _LINE_WIDTH_PX = 1.7  # of a thin line's core, in the mean
+_GLARE = 17  # of the background's pixels: reflections are narrower
 _DEEPEST = 0.20  # fraction of the board's brightness that is left in the darkest shadow
 
 
@@ -115,8 +116,10 @@ class Segmenter:
         ink = np.zeros((n, n), np.uint8)
         if seen.any():
             darkest = _darkest(photo[self._window], seen)
-            evened = cv2.divide(darkest, _background(darkest, seen), scale=_BRIGHT)
-            ink[self._window] = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
+            background = _background(darkest, seen)
+            evened = cv2.divide(darkest, background, scale=_BRIGHT)
+            specks = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
+            ink[self._window] = cv2.bitwise_or(specks, self._lines(darkest, background, seen))
         covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
         return np.where(covered > 255 * self.ink.covered, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
 
@@ -142,17 +145,20 @@ class Segmenter:
         kept = np.zeros(count, np.uint8)
         kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
         kept[stats[:, cv2.CC_STAT_AREA] < self.ink.least_px] = 0
-        ink = self._lines(evened, seen, int(middle))
-        ink.ravel()[places] |= kept[names]
+        ink = np.zeros_like(evened)
+        ink.ravel()[places] = kept[names]
         return ink
 
-    def _lines(self, evened: np.ndarray, seen: np.ndarray, middle: int) -> np.ndarray:
+    def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
-        smooth = cv2.GaussianBlur(evened, (5, 5), _LINE_BLUR_PX)
-        smooth[seen == 0] = middle
-        hollow = cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8))
+        smooth = cv2.min(cv2.GaussianBlur(darkest, (5, 5), _LINE_BLUR_PX), background)  # between reflections is no line
+        np.copyto(smooth, background, where=seen == 0)
+        sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
+        hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
         usual, noise = _middle_and_spread(hollow, seen)
-        candidates = cv2.bitwise_and((hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)).view(np.uint8), seen)
+        core = hollow > cv2.dilate(hollow, np.ones((5, 5), np.uint8)) // 2  # and not what blurs beside it
+        dark = hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)
+        candidates = cv2.bitwise_and((dark & core).view(np.uint8), seen)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]
@@ -160,7 +166,7 @@ class Segmenter:
         kept[names[hollow.ravel()[places] > max(usual + 7 * noise, _BRIGHT * self.ink.clear_line)]] = 255
         kept[stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1) < self.ink.line_px] = 0
         kept[stats[:, cv2.CC_STAT_AREA] < _LINE_WIDTH_PX * self.ink.line_px] = 0
-        ink = np.zeros_like(evened)
+        ink = np.zeros_like(darkest)
         ink.ravel()[places] = kept[names]
         return ink
 
@@ -202,8 +208,17 @@ def _background(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
     inside = high.copy()
     inside[~whole] = 255
     closed = cv2.min(cv2.erode(inside, window), high)
-    smooth = np.maximum(cv2.GaussianBlur(closed, (5, 5), 0), 1)
+    smooth = np.maximum(cv2.GaussianBlur(_without_glare(closed, whole), (5, 5), 0), 1)
     return cv2.resize(smooth, picture.shape[::-1], interpolation=cv2.INTER_LINEAR)
+
+
+def _without_glare(level: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Open the brightness of the board: a reflection is brighter than what is about it, and a gap in it no line."""
+    window = np.ones((_GLARE, _GLARE), np.uint8)
+    inside = np.where(whole, level, 255).astype(np.uint8)
+    low = cv2.erode(inside, window)
+    low[~whole] = 0
+    return cv2.min(cv2.dilate(low, window), level)
 
 
 def _histogram(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
