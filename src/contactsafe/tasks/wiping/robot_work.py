@@ -31,7 +31,7 @@ _LEAST_PX = 3
 class Pictures(Protocol):
     """What takes pictures of the board."""
 
-    def open(self) -> None:
+    def open(self, lockstep: bool) -> None:
         """Begin, in the policy's process."""
         ...
 
@@ -82,13 +82,12 @@ class WipingWork:
 
     def prepare(self, arm: Arm, lockstep: bool) -> None:
         """Open the camera."""
-        del lockstep
         keep_to_one_thread()
         self._eye = Photographer(self.camera, self.board, build_plant(arm, WorldConfig(fixtures=())))
         self._segmenter = Segmenter(self._eye.homography, self._eye.corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
-        self.pictures.open()
+        self.pictures.open(lockstep)
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
         """Segment the newest picture; where the arm hides the board is known by its joints."""
