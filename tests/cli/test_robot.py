@@ -71,13 +71,13 @@ def test_a_log_says_all_that_its_torques_follow_from(tmp_path):
 def test_the_status_line_names_state_reason_contact_and_losses(capsys):
     status = np.zeros(1, status_dtype)
     status["tick"], status["state"], status["reason"] = 12_300, states.HELD, states.TARGET_OLD
-    status["contact_link"], status["contact_nm"], status["lost"] = 5, 7.2, 3
+    status["contact_link"], status["contact_n"], status["contact_nm"], status["lost"] = 5, 21.4, 7.2, 3
     status["busy"][0, 40] = 10
     line = StatusLine()
     line(status[0])
     line(status[0])  # at once: nothing is said twice
     (said,) = capsys.readouterr().err.strip().splitlines()
-    for word in ("12.3 s", "held (targets too old)", "link 5 7 N m", "busy 40 µs", "lost 3"):
+    for word in ("12.3 s", "held (targets too old)", "link 5 21 N, 7 N m", "busy 40 µs", "lost 3"):
         assert word in said
 
 
