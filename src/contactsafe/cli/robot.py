@@ -234,7 +234,11 @@ class StatusLine(Unique):
         self._last = now
         state = STATES[int(status["state"])]
         reason = f" ({REASONS[int(status['reason'])].name})" if status["reason"] else ""
-        contact = f"link {status['contact_link']} {status['contact_n']:.0f} N, {status['contact_nm']:.0f} N m" if status["contact_link"] else "none"
+        contact = (
+            f"link {status['contact_link']} {status['contact_n']:.0f} N, {status['contact_nm']:.0f} N m"
+            if status["contact_link"]
+            else "none"
+        )
         counts = np.cumsum(status["busy"])
         busy = int(np.searchsorted(counts, 0.99 * counts[-1])) if counts[-1] else 0
         line = (
