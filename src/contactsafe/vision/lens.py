@@ -44,26 +44,16 @@ class Lens:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
 
-class Square(Independent):
-    """The undistorted square of a camera's picture that a photograph is.
+class View(Independent):
+    """A square photograph that is looked up in a camera's picture.
 
     Args:
         lens: of the camera.
-        size: pixels along an edge of the photograph.
-        focal_px: its focal length, pixels.
-
-    Attributes:
-        matrix: OpenCV's camera matrix of the photograph, (3, 3).
+        maps: for each pixel of the photograph where it is in the picture, as `cv2.convertMaps` returns it.
     """
 
-    def __init__(self, lens: Lens, size: int, focal_px: float):
-        self.lens, self.size = lens, size
-        middle = (size - 1) / 2.0
-        self.matrix = np.array([[focal_px, 0.0, middle], [0.0, focal_px, middle], [0.0, 0.0, 1.0]])
-        distortion = np.array(lens.distortion)
-        self._maps = cv2.initUndistortRectifyMap(
-            lens.matrix, distortion, np.eye(3), self.matrix, (size, size), cv2.CV_16SC2
-        )
+    def __init__(self, lens: Lens, maps: tuple[np.ndarray, np.ndarray]):
+        self.lens, self._maps = lens, maps
 
     def cut(self, picture: np.ndarray) -> np.ndarray:
         """Return the photograph, uint8 (size, size, 3), of a camera's picture, uint8 (height, width, 3).
@@ -78,6 +68,27 @@ class Square(Independent):
                 f"({self.lens.height}, {self.lens.width}, 3)"
             )
         return cv2.remap(picture, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+
+class Square(View):
+    """The undistorted square of a camera's picture that a photograph is.
+
+    Args:
+        lens: of the camera.
+        size: pixels along an edge of the photograph.
+        focal_px: its focal length, pixels.
+
+    Attributes:
+        matrix: OpenCV's camera matrix of the photograph, (3, 3).
+    """
+
+    def __init__(self, lens: Lens, size: int, focal_px: float):
+        self.size = size
+        middle = (size - 1) / 2.0
+        self.matrix = np.array([[focal_px, 0.0, middle], [0.0, focal_px, middle], [0.0, 0.0, 1.0]])
+        distortion, straight = np.array(lens.distortion), np.eye(3)
+        maps = cv2.initUndistortRectifyMap(lens.matrix, distortion, straight, self.matrix, (size, size), cv2.CV_16SC2)
+        super().__init__(lens, maps)
 
 
 class Distorted(Independent):
