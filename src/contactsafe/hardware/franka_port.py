@@ -54,13 +54,18 @@ class FrankaPort:
 
     def connect(self) -> None:
         """Reach the robot; raise what it takes for a collision, tell it the load."""
-        with _named(self._library), realtime.kept():
-            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+        self.reach()
+        with _named(self._library):
             torques, forces = [COLLISION_NM] * 7, [COLLISION_N] * 6
             self._robot.set_collision_behavior(torques, torques, forces, forces)
             if self._load is not None:
                 mass, centre, inertia = self._load
                 self._robot.set_load(mass, list(centre), list(np.asarray(inertia).reshape(9, order="F")))
+
+    def reach(self) -> None:
+        """Reach the robot to look at it; tell it nothing."""
+        with _named(self._library), realtime.kept():
+            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
 
     def look(self, reading: np.ndarray) -> None:
         """Fill a reading of a robot at rest."""

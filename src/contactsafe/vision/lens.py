@@ -96,13 +96,14 @@ class Distorted(Independent):
 
     Args:
         square: that the photograph is.
+        turned: the camera's axes in those of the photograph's, (3, 3); None where they are the same.
     """
 
-    def __init__(self, square: Square):
-        lens, size = square.lens, square.size
+    def __init__(self, square: Square, turned: np.ndarray | None = None):
+        lens, size, turned = square.lens, square.size, np.eye(3) if turned is None else turned
         columns, rows = np.meshgrid(np.arange(lens.width, dtype=np.float32), np.arange(lens.height, dtype=np.float32))
         seen = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
-        straight = cv2.undistortPoints(seen, lens.matrix, np.array(lens.distortion), P=square.matrix)[:, 0]
+        straight = cv2.undistortPoints(seen, lens.matrix, np.array(lens.distortion), R=turned, P=square.matrix)[:, 0]
         u, v = (straight[:, k].reshape(lens.height, lens.width).astype(np.float32) for k in (0, 1))
         reached = (u > -1.0) & (u < size) & (v > -1.0) & (v < size)
         places = np.nonzero(reached)

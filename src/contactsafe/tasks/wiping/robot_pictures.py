@@ -1,6 +1,7 @@
 """Pictures of the board for a robot: from a RealSense, or from one made of software before a simulated board."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
+from contactsafe.tasks.wiping.camera import camera_axes
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.tasks.wiping.robot_board import map_shown
-from contactsafe.vision.lens import Distorted, Lens, Square
+from contactsafe.vision.lens import Distorted, Lens, Square, View
 
 D455 = Lens(WIDTH, HEIGHT, 639.0, 639.0, 639.5, 359.5, (-0.056, 0.065, 0.0, 0.0, 0.0))
 """Colour pictures of a RealSense D455; three units read from 632 to 646 pixels of focal length, k1 −0.056, k2 0.065."""
@@ -28,6 +31,26 @@ def focal_px(camera: Camera) -> float:
     return camera.focal_px * PHOTO_PX / camera.size
 
 
+def lens_of(source: ColourCamera) -> Lens:
+    """Return what an open device knows of its lens."""
+    lens = source.intrinsics
+    k1, k2, p1, p2, k3 = lens.coeffs
+    return Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, (k1, k2, p1, p2, k3))
+
+
+def camera_over(placed: PlacedCamera) -> Camera:
+    """Return the upright camera at a calibrated one's place that looks at the board and shows it as large as ever."""
+    known, centre = placed.camera, placed.board.centre
+    x, y, z = placed.calibration.pose_base_camera[:3, 3].tolist()
+    nearer = math.dist((x, y, z), centre) / math.dist(known.position, known.target)
+    return replace(known, position=(x, y, z), target=centre, focal_px=known.focal_px * nearer)
+
+
+def turned_from(camera: Camera, placed: PlacedCamera) -> np.ndarray:
+    """Return the axes of a calibrated camera in those of one at the same place, (3, 3)."""
+    return camera_axes(camera).T @ placed.calibration.pose_base_camera[:3, :3]
+
+
 def _opened(source: ColourCamera | None) -> ColourCamera:
     """Return a camera that was opened; asking for pictures before that is a mistake of the program."""
     if source is None:
@@ -36,24 +59,28 @@ def _opened(source: ColourCamera | None) -> ColourCamera:
 
 
 class CameraPictures:
-    """Photographs of a RealSense camera that stands where the policy's camera was in training.
+    """Photographs of a RealSense camera as the policy's camera took them in training.
 
     Args:
         serial: of the camera; None for the first one.
         camera: that the policy was trained with.
+        placed: where the RealSense was calibrated to stand; None where it stands where that camera was.
     """
 
-    def __init__(self, serial: str | None, camera: Camera):
-        self._serial, self._camera = serial, camera
+    def __init__(self, serial: str | None, camera: Camera, placed: PlacedCamera | None = None):
+        self._serial, self._camera, self._placed = serial, camera, placed
         self._source: ColourCamera | None = None
 
     def open(self) -> None:
         """Open it, and take over what its device knows of its lens."""
         self._source = source = ColourCamera(self._serial)
         source.open()
-        lens = source.intrinsics
-        known = Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, tuple(lens.coeffs))
-        self._square = Square(known, PHOTO_PX, focal_px(self._camera))
+        lens = lens_of(source)
+        if self._placed is None:
+            self._view: View = Square(lens, PHOTO_PX, focal_px(self._camera))
+        else:
+            self._placed.refuse_other(lens)
+            self._view = self._placed.view()
         self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
 
     def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
@@ -65,7 +92,7 @@ class CameraPictures:
             source.look_again()
             return self._photo, self._number, math.inf if picture is None else age_ms
         if number != self._number:
-            self._photo, self._number = self._square.cut(picture), number
+            self._photo, self._number = self._view.cut(picture), number
         return self._photo, number, age_ms
 
     def close(self) -> None:
@@ -82,19 +109,26 @@ class PhotographedBoard:
         arm: that stands before it.
         board, camera: as they are.
         seed: of light and noise.
+        placed: where the camera was calibrated to stand over that board; None for `camera` itself.
     """
 
-    def __init__(self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int):
-        self._path, self._arm, self._board, self._camera, self._seed = path, arm, board, camera, seed
+    def __init__(
+        self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int, placed: PlacedCamera | None = None
+    ):
+        self._path, self._arm, self._board, self._seed, self._placed = path, arm, board, seed, placed
+        self._camera = camera if placed is None else camera_over(placed)
         self._source: ColourCamera | None = None
 
     def open(self) -> None:
         """Map what the board shows, and start the camera."""
         self._shown = map_shown(self._path, self._board)
         self._photographer = Photographer(self._camera, self._board, build_plant(self._arm, WorldConfig(fixtures=())))
-        self._square = Square(D455, PHOTO_PX, focal_px(self._camera))
-        self._distorted = Distorted(self._square)
-        self._device = SoftwareCamera(D455.fx, D455.fy, D455.cx, D455.cy, D455.distortion)
+        lens = D455 if self._placed is None else self._placed.calibration.lens
+        square = Square(lens, PHOTO_PX, focal_px(self._camera))
+        turned = None if self._placed is None else turned_from(self._camera, self._placed)
+        self._view = square if self._placed is None else self._placed.view()
+        self._distorted = Distorted(square, turned)
+        self._device = SoftwareCamera(lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion)
         self._source = ColourCamera(sensor=self._device.sensor, profile=self._device.profile)
         self._source.open()
         self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
@@ -109,7 +143,7 @@ class PhotographedBoard:
             self._device.give(self._distorted.picture(photograph), number, 1000.0 * number / 30.0)
             picture, self._number, _ = _opened(self._source).newest(_WAIT_MS)
             if picture is not None:
-                self._photo = self._square.cut(picture)
+                self._photo = self._view.cut(picture)
         return self._photo, self._number, float(tick - number * _EVERY_TICKS)
 
     def close(self) -> None:
