@@ -1,6 +1,7 @@
 """A real camera's lens: from its picture to the undistorted square about the board, and back for a synthetic one."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,12 @@ class Lens:
                 f"lens {self.width} × {self.height}, fx = {self.fx}, fy = {self.fy}; give 16 pixels or more, focal "
                 "lengths above 0, finite numbers"
             )
+
+    @classmethod
+    def of_realsense(cls, known: Any) -> "Lens":
+        """Return librealsense's `intrinsics` as a lens."""
+        k1, k2, p1, p2, k3 = known.coeffs
+        return cls(known.width, known.height, known.fx, known.fy, known.ppx, known.ppy, (k1, k2, p1, p2, k3))
 
     @property
     def matrix(self) -> np.ndarray:

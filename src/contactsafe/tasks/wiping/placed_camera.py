@@ -25,8 +25,11 @@ ASIDE_M, HEIGHT_M = 0.10, 0.05
 TILT_RAD = math.hypot(*2 * [Randomisation.broad().board_tilt_rad[1]])
 """By which it may be tilted: as far as the shipped policy was trained with."""
 
-TURNED_RAD = math.radians(10.0)
+TURNED_RAD = math.radians(20.0)
 """By which its edges may be turned from the robot's axes."""
+
+_AROUND_M = 0.03
+"""By which more than what may be wiped is looked at, on every side."""
 
 LEAST_PX_M = 250.0
 """Pixels of the camera to a metre of the board, where it sees it most coarsely."""
@@ -97,10 +100,11 @@ class PlacedCamera:
 
     @property
     def corners(self) -> np.ndarray:
-        """Of the board, in turn around it, policy's frame, (4, 2), m."""
-        c, s = math.cos(self.turned_rad), math.sin(self.turned_rad)
-        middle = np.array(self.trained.centre[:2])
-        return middle + (corners_of(self.trained) - middle) @ np.array([[c, s], [-s, c]])
+        """Of what is looked at of the board, in turn around it, policy's frame, (4, 2), m.
+
+        All that may be wiped, and less than the board by more than a target lies askew: beyond its edge is no ink.
+        """
+        return corners_of(replace(self.trained, size=2 * (self.trained.ink_size + 2 * _AROUND_M,)))
 
     @property
     def plane(self) -> np.ndarray:

@@ -11,11 +11,12 @@ from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
-from contactsafe.tasks.wiping.camera import camera_axes
-from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
+from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer, corners_of
 from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.tasks.wiping.robot_board import map_shown
 from contactsafe.vision.lens import Distorted, Lens, Square, View
+from contactsafe.vision.silhouette import on_plane
 
 D455 = Lens(WIDTH, HEIGHT, 639.0, 639.0, 639.5, 359.5, (-0.056, 0.065, 0.0, 0.0, 0.0))
 """Colour pictures of a RealSense D455; three units read from 632 to 646 pixels of focal length, k1 −0.056, k2 0.065."""
@@ -31,19 +32,14 @@ def focal_px(camera: Camera) -> float:
     return camera.focal_px * PHOTO_PX / camera.size
 
 
-def lens_of(source: ColourCamera) -> Lens:
-    """Return what an open device knows of its lens."""
-    lens = source.intrinsics
-    k1, k2, p1, p2, k3 = lens.coeffs
-    return Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, (k1, k2, p1, p2, k3))
-
-
 def camera_over(placed: PlacedCamera) -> Camera:
-    """Return the upright camera at a calibrated one's place that looks at the board and shows it as large as ever."""
-    known, centre = placed.camera, placed.board.centre
+    """Return the upright camera at a calibrated one's place that looks at the board, and shows all of it."""
+    board = placed.board
     x, y, z = placed.calibration.pose_base_camera[:3, 3].tolist()
-    nearer = math.dist((x, y, z), centre) / math.dist(known.position, known.target)
-    return replace(known, position=(x, y, z), target=centre, focal_px=known.focal_px * nearer)
+    camera = replace(placed.camera, position=(x, y, z), target=board.centre)
+    middle = camera.size / 2.0
+    reach = np.abs(on_plane(corners_of(board), plane_homography(camera, board.centre[2])) - middle).max()
+    return replace(camera, focal_px=camera.focal_px * middle / float(reach))
 
 
 def turned_from(camera: Camera, placed: PlacedCamera) -> np.ndarray:
@@ -75,7 +71,7 @@ class CameraPictures:
         """Open it, and take over what its device knows of its lens."""
         self._source = source = ColourCamera(self._serial)
         source.open()
-        lens = lens_of(source)
+        lens = Lens.of_realsense(source.intrinsics)
         if self._placed is None:
             self._view: View = Square(lens, PHOTO_PX, focal_px(self._camera))
         else:
