@@ -90,3 +90,41 @@ def test_a_small_target_far_away_is_ambiguous():
     seen = Corners(np.arange(24), pixels + np.random.default_rng(1).normal(0.0, 0.15, pixels.shape))
     with pytest.raises(InvalidInputError, match=r"the pose is ambiguous: .*; come nearer, or use a larger target"):
         find_camera(small, dataclasses.replace(D455, distortion=(0.0,) * 5), [seen])
+
+
+@pytest.mark.parametrize("planted", STANDS)
+def test_a_target_that_is_partly_covered_is_enough(planted):
+    """A hand, a glare, the picture's edge: corners are known by number."""
+    image = picture(planted, 3)
+    seen = TARGET.find(image)
+    middle = np.quantile(seen.pixels[:, 0], 0.75)
+    image[:, int(middle) :] = 120
+    rest = TARGET.find(image)
+    assert 8 <= len(rest.ids) < len(seen.ids)
+    assert set(rest.ids) <= set(seen.ids)
+    millimetres, degrees = apart(find_camera(TARGET, D455, [rest]).pose_target_camera, planted)
+    assert millimetres < 8.0
+    assert degrees < 0.8
+
+
+def test_grey_and_colour_give_the_same_corners():
+    image = picture(STANDS[0], 0, noise=0.0)
+    colour, grey = TARGET.find(image), TARGET.find(np.ascontiguousarray(image[..., 0]))
+    np.testing.assert_array_equal(colour.ids, grey.ids)
+    np.testing.assert_allclose(colour.pixels, grey.pixels, atol=0.05)
+
+
+def test_more_pictures_bring_the_pose_nearer():
+    planted, away = STANDS[0], []
+    seen = [shown(planted, 0.3, seed=seed) for seed in range(40)]
+    for several in (1, 10):
+        found = [find_camera(TARGET, D455, seen[k : k + several]) for k in range(0, 40, several)]
+        away.append(np.mean([apart(one.pose_target_camera, planted)[0] for one in found]))
+    assert away[1] < 0.6 * away[0]
+
+
+def test_a_target_of_another_size_is_seen_at_another_distance():
+    """A square that was not measured shifts the camera by as much: the touched corners tell it."""
+    seen = shown(STANDS[0])
+    larger = find_camera(CharucoTarget(7, 5, 0.036 * 1.03), D455, [seen]).pose_target_camera
+    assert np.linalg.norm(larger[:3, 3]) == pytest.approx(1.03 * np.linalg.norm(STANDS[0][:3, 3]), rel=1e-3)

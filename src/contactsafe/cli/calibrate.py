@@ -112,10 +112,8 @@ def calibrate(arguments: Sequence[str]) -> None:
         return
     found = _found(asked, target)
     found.save(asked.path)
-    if asked.json:
-        print(json.dumps(found.as_dict(), indent=1))
-    else:
-        print("\n".join([*lines_of(found), f"{'written':12s} {asked.path}; give it to run as --camera-calibration"]))
+    said = [*lines_of(found), f"{'written':12s} {asked.path}; give it to run as --camera-calibration"]
+    print(json.dumps(found.as_dict(), indent=1) if asked.json else "\n".join(said))
 
 
 def _print(asked: Options, target: "CharucoTarget") -> None:

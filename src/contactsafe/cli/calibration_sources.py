@@ -146,11 +146,7 @@ def touched_of(asked: "Options") -> dict[str, np.ndarray]:
 
 
 def hand_eye_of(asked: "Options", target: CharucoTarget, source: Source) -> HandEye:
-    """Return the camera's pose from the pictures of the target in the hand.
-
-    Raises:
-        InvalidInputError: a file is missing or damaged, or the pictures tell no pose.
-    """
+    """Return the camera's pose from the pictures of the target in the hand; refuse what tells none."""
     folder = Path(str(asked.poses))
     arm = arm_of("fr3", "flange", None)
     if asked.robot is not None:

@@ -18,20 +18,23 @@ pytest.importorskip("pyrealsense2")
 import cv2
 from tests.vision.rendered import D455, TARGET, looking, picture, turn
 
+from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
+from contactsafe.tasks.wiping.photograph import corners_of
 from contactsafe.tasks.wiping.placed_camera import TILT_RAD, PlacedCamera
 from contactsafe.tasks.wiping.robot import WipingRobot
-from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard
+from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard, camera_over, turned_from
 from contactsafe.tasks.wiping.robot_work import WipingWork
 from contactsafe.vision.camera_calibration import CameraCalibration
 from contactsafe.vision.camera_pose import find_camera
 from contactsafe.vision.rigid import pose_of
+from contactsafe.vision.silhouette import on_plane
 
 TRAINED = BoardConfig().centre
 
 STANDS = {
     "as in training": looking((0.55, 0.0, 0.64)),
-    "on the left": looking((0.2, 0.55, 0.6), at=(0.02, 0.0, 0.0)),
-    "beside the base": looking((-0.35, -0.5, 0.65), at=(0.0, 0.03, 0.0), roll=0.5),
+    "on the left": looking((0.35, 0.5, 0.6), at=(0.02, 0.0, 0.0)),
+    "on the right": looking((0.3, -0.5, 0.65), at=(0.0, 0.03, 0.0), roll=0.5),
     "upside down": looking((0.4, -0.3, 0.6), roll=3.0),
 }
 """Cameras, from the board's middle."""
@@ -167,6 +170,7 @@ def test_without_calibration_another_camera_is_of_no_use(known, arm, tmp_path):
     ("on the left", pose_of(turn([0.03, 0.0, 0.0]), TRAINED), r"tilted by 1\.72°, allowed 0\.97°; level it"),
     ("on the left", pose_of(turn([0.0, 0.0, 0.6]), TRAINED), "turned by 34° .* allowed 20°"),
     (looking((0.55, 0.0, 0.64), at=(0.0, 0.5, 0.0)), LYING["as in training"], r"sees \d+ % of .* allowed 100 %"),
+    (looking((-0.3, 0.4, 0.7)), LYING["as in training"], r"127° round the board .* allowed 60°: .* opposite the robot"),
     (looking((0.9, 0.0, 0.2)), LYING["as in training"], r"at \d+ pixels a metre .* allowed 250"),
     (looking((1.0, 0.0, 0.5), at=(3.0, 0.0, 1.0)), LYING["as in training"], "shows nothing of the plane"),
 ])  # fmt: skip
@@ -205,3 +209,44 @@ def test_a_device_with_another_lens_is_refused():
     for change in ({"fx": 700.0}, {"width": 848}):
         with pytest.raises(InvalidInputError, match="calibrate this camera"):
             placed.refuse_other(dataclasses.replace(D455, **change))
+
+
+def test_a_simulated_run_puts_board_and_camera_where_the_file_says(arm, tmp_path):
+    calibration = placed_at(STANDS["on the right"], LYING["elsewhere"]).calibration
+    run = WipingRobot().simulated(arm, tmp_path / "shared", 0, 2, False, camera_calibration=calibration)
+    try:
+        (bench,) = run.scene.fixtures
+        np.testing.assert_allclose(bench.position, LYING["elsewhere"][:3, 3])
+        np.testing.assert_allclose(run.work.centre, LYING["elsewhere"][:3, 3])
+        np.testing.assert_allclose(run.effect._config.centre, LYING["elsewhere"][:3, 3])
+        np.testing.assert_allclose(run.work.pictures._camera.position, calibration.pose_base_camera[:3, 3])
+        assert run.work.placed.calibration is calibration
+    finally:
+        run.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("stand", STANDS.values(), ids=STANDS)
+def test_the_simulated_camera_is_the_calibrated_one(stand):
+    """Points of the board are in its picture where the calibrated lens has them."""
+    placed = placed_at(stand, LYING["elsewhere"])
+    camera = camera_over(placed)
+    axes = turned_from(camera, placed)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    known = placed.calibration.pose_base_camera
+    np.testing.assert_allclose(camera_axes(camera) @ axes, known[:3, :3], atol=1e-12)
+    np.testing.assert_allclose(camera.position, known[:3, 3])
+    corners = on_plane(corners_of(placed.board), plane_homography(camera, placed.board.centre[2]))
+    assert corners.min() > -1e-6
+    assert corners.max() < camera.size + 1e-6
+
+
+@pytest.mark.parametrize("degrees", [-170, -59, 0, 45, 120])
+def test_round_the_board_counts_from_opposite_the_robot(degrees):
+    angle = math.radians(degrees)
+    stand = looking((0.5 * math.cos(angle), 0.5 * math.sin(angle), 0.6))
+    if abs(degrees) > 60:
+        with pytest.raises(InvalidInputError, match=f"{abs(degrees)}° round the board"):
+            placed_at(stand)
+    else:
+        assert placed_at(stand).round_rad == pytest.approx(angle)

@@ -31,6 +31,11 @@ TURNED_RAD = math.radians(20.0)
 _AROUND_M = 0.03
 """By which more than what may be wiped is looked at, on every side."""
 
+ROUND_RAD = math.radians(60.0)
+"""By which the camera may stand round the board from straight beyond it, where training had it: from further round the
+arm hides what it is about to wipe. What the shipped policy cleans from where is in
+docs/howto/real_robot.md."""
+
 LEAST_PX_M = 250.0
 """Pixels of the camera to a metre of the board, where it sees it most coarsely."""
 
@@ -74,6 +79,12 @@ class PlacedCamera:
                 f"the target is turned by {math.degrees(self.turned_rad):.0f}° from the robot's axes, allowed "
                 f"{math.degrees(TURNED_RAD):.0f}°; lay it and the board along them, and calibrate anew"
             )
+        if abs(self.round_rad) > ROUND_RAD:
+            raise InvalidInputError(
+                f"the camera stands {math.degrees(abs(self.round_rad)):.0f}° round the board from opposite the robot, "
+                f"where training had it, allowed {math.degrees(ROUND_RAD):.0f}°: from there the arm hides what it is "
+                "about to wipe; put it opposite the robot, and calibrate anew"
+            )
         self._refuse_unseen()
 
     @property
@@ -97,6 +108,14 @@ class PlacedCamera:
         """Angle from the robot's axes to the nearest edges of the target, about the vertical, within ± π/4."""
         x, y = self.calibration.pose_base_target[:2, 0]
         return (math.atan2(y, x) + math.pi / 4) % (math.pi / 2) - math.pi / 4
+
+    @property
+    def round_rad(self) -> float:
+        """Angle about the vertical through the board's middle from the camera of training to this one, rad."""
+        trained = np.array(self.camera.position[:2]) - np.array(self.trained.centre[:2])
+        away = self.calibration.pose_base_camera[:2, 3] - np.array(self.board.centre[:2])
+        across, along = trained[0] * away[1] - trained[1] * away[0], trained @ away
+        return math.atan2(float(across), float(along))
 
     @property
     def corners(self) -> np.ndarray:
