@@ -397,7 +397,7 @@ def is_plain(kind):
 
 HANDED_OVER = {
     "FrankaPort", "InsertionRobot", "InsertionWork", "MovedBlock", "WipingRobot", "WipedBoard", "CameraPictures",
-    "PandaPort", "PhotographedBoard", "Drawing", "Square", "Distorted",
+    "PandaPort", "PhotographedBoard", "Drawing", "Square", "Distorted", "View", "PlaneView",
 }  # fmt: skip
 """What a run hands to its processes before any of it begins, pickled: `tests/hardware` has runs. Until then it is a
 plain record of what it was made of; the lenses are arrays."""

@@ -25,6 +25,7 @@ from contactsafe.tasks.insertion.robot import InsertionRobot
     (["--simulated", "--dry-run"], "dry_run and recover are for real robots"),
     (["--robot", "172.16.0.2", "--lockstep"], "lockstep is for simulated robots"),
     (["--simulated", "--task", "insertion", "nowhere"], "no bundle at nowhere"),
+    (["--simulated", "--camera-calibration", "nowhere.json"], "nowhere.json cannot be read: No such file"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused_in_one_line(words, told, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -94,6 +95,29 @@ def test_the_checklist_names_robot_tool_way_speed_and_stop():
     text = checklist(Options(robot="172.16.0.2", speed=0.2), arm, task.work(), reading_at(arm, arm.home))
     for word in ("172.16.0.2, idle", "franka hand with peg", "first move", "speed        0.2", "emergency stop"):
         assert word in text
+
+
+def test_the_checklist_says_where_the_calibrated_camera_stands(tmp_path):
+    calibration = pytest.importorskip("contactsafe.vision.camera_calibration").CameraCalibration
+    from contactsafe.vision.lens import Lens
+
+    down, lying = np.diag([1.0, -1.0, -1.0, 1.0]), np.eye(4)
+    down[:3, 3], lying[:3, 3] = [0.5, 0.1, 0.9], [0.5, 0.0, 0.02]
+    known = calibration(Lens(1280, 720, 639.0, 639.0, 640.0, 360.0), down, lying, "42", "touch", {"residual_mm": 0.4})
+    known.save(tmp_path / "camera.json")
+    task = InsertionRobot()
+    arm = robots.fr3(task.tool)
+    asked = Options(robot="172.16.0.2", camera_calibration=tmp_path / "camera.json")
+    text = checklist(asked, arm, task.work(), reading_at(arm, arm.home))
+    for word in (
+        "42, 1280 × 720",
+        "residual 0.40 mm",
+        "at 0.500, 0.100, 0.900 m",
+        "its middle at 0.500, 0.000, 0.020 m",
+    ):
+        assert word in text
+    with pytest.raises(InvalidInputError, match="insertion looks with no camera"):
+        task.work(camera_calibration=known)
 
 
 def test_an_arm_at_its_limit_or_on_the_move_is_refused():

@@ -1,7 +1,5 @@
 """`contactsafe run --robot ADDRESS`: what is checked, said and asked before a real robot moves."""
 
-from typing import Any
-
 import numpy as np
 
 from contactsafe.cli.robot import ARMS, LOG, Options, StatusLine, load_of, parts_of, refuse_failed, said_of
@@ -25,9 +23,8 @@ _NOT_READY = {
 }
 
 
-def run_real(asked: Options, task: Any, arm: Arm, bundle: Bundle) -> None:
+def run_real(asked: Options, work: Work, arm: Arm, bundle: Bundle) -> None:
     """Look at the robot, show the checklist, ask, and run; with --dry-run look and show alone."""
-    work = task.work(camera=asked.camera)
     print(checklist(asked, arm, work, look(asked, arm)))
     if asked.dry_run:
         return
@@ -82,12 +79,23 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
         f"tool         {arm.tool.name if arm.tool else 'none'}, {weight}; now at {_words(tool)} m",
         f"first move   up, aside and down to {_words(start)} m: is that path free?",
         f"workspace    about {_words(np.array(work.centre))} m: does what is worked on stand there, level?",
+        *_camera_lines(asked),
         f"speed        {asked.speed:g} of the policy's own; begin with --speed 0.2",
         f"collisions   the robot stops by itself beyond {COLLISION_NM:g} N m and {COLLISION_N:g} N: raised, since the "
         "controller keeps contacts gentle by itself, and an impact is short",
         "stop         is the emergency stop within your reach? Ctrl-C brings the arm to rest, too",
     ]
     return "\n".join(lines)
+
+
+def _camera_lines(asked: Options) -> list[str]:
+    """Return what was calibrated of the camera."""
+    if asked.camera_calibration is None:
+        return []
+    from contactsafe.cli.calibrate import lines_of
+    from contactsafe.vision.camera_calibration import CameraCalibration
+
+    return lines_of(CameraCalibration.load(asked.camera_calibration))
 
 
 def _words(values: np.ndarray) -> str:

@@ -88,6 +88,7 @@ class Options:
         seed: of what is drawn, of light and of noise.
         out: folder for log and page.
         calibration: what `contactsafe identify` wrote of the robot.
+        camera_calibration: what `contactsafe calibrate` wrote; without it the camera stands where training had it.
         priority: of the control process under SCHED_FIFO; 0 for none.
         json: print JSON instead of a table.
     """
@@ -111,6 +112,7 @@ class Options:
     seed: int = 0
     out: Path = Path("runs/robot")
     calibration: CalibrationFile = None
+    camera_calibration: CalibrationFile = None
     priority: int = 80
     json: bool = False
 
@@ -143,6 +145,7 @@ def run(arguments: Sequence[str]) -> None:
     """
     asked = parse(Options, "contactsafe run", arguments, description=docstring(run))
     asked.check()
+    looks = looks_of(asked)
     described = task_by_name(task_of(arguments))
     if described.robot is None:
         raise InvalidInputError(f"task '{described.name}' says nothing of real robots; see docs/howto/own_task.md")
@@ -155,20 +158,34 @@ def run(arguments: Sequence[str]) -> None:
     if not asked.simulated:
         from contactsafe.cli.real_robot import run_real
 
-        run_real(asked, task, arm, bundle)
+        run_real(asked, task.work(**looks), arm, bundle)
         return
     names = [asked.controller] + ([] if asked.against == "none" else [asked.against])
-    runs = [_simulated(asked, task, arm, bundle.folder, name) for name in dict.fromkeys(names)]
+    runs = [_simulated(asked, task, arm, bundle.folder, name, looks) for name in dict.fromkeys(names)]
     _show(asked, runs, shlex.join(["contactsafe", "run", *arguments]))
 
 
-def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str) -> RobotRun:
+def looks_of(asked: Options) -> dict[str, Any]:
+    """Return what the task looks with.
+
+    Raises:
+        InvalidInputError: the file is no calibration of a camera.
+    """
+    looks: dict[str, Any] = {"camera": asked.camera}
+    if asked.camera_calibration is not None:
+        from contactsafe.vision.camera_calibration import CameraCalibration
+
+        looks["camera_calibration"] = CameraCalibration.load(asked.camera_calibration)
+    return looks
+
+
+def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str, looks: dict[str, Any]) -> RobotRun:
     """Run once against the simulated robot."""
     folder = asked.out / controller.replace(":", "-")
     folder.mkdir(parents=True, exist_ok=True)
     exchange = Exchange.create(arm.n)
     exchange.status["lockstep"] = asked.lockstep
-    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone)
+    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone, **looks)
     robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
     try:
         with robot:
@@ -184,7 +201,8 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
 
 def said_of(asked: Options, controller: str) -> dict[str, str]:
     """Return what a log says of its run: all that is needed to compute its torques again."""
-    calibrated = {} if asked.calibration is None else {"calibration": str(asked.calibration.resolve())}
+    files = {"calibration": asked.calibration, "camera_calibration": asked.camera_calibration}
+    calibrated = {name: str(path.resolve()) for name, path in files.items() if path is not None}
     return {"robot": asked.arm, "task": asked.task, "controller": controller, **calibrated}
 
 

@@ -56,8 +56,8 @@ class FrankaPort:
 
     def connect(self) -> None:
         """Reach the robot; raise what it takes for a collision, tell it the load."""
-        with _named(self._library), realtime.kept():
-            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+        self.reach()
+        with _named(self._library):
             torques, forces = [COLLISION_NM] * 7, [COLLISION_N] * 6
             self._robot.set_collision_behavior(torques, torques, forces, forces)
             if self._load is not None:
@@ -68,6 +68,11 @@ class FrankaPort:
         """Acknowledge the error that stopped it; what needs Desk or the emergency stop is refused by the robot."""
         with _named(self._library):
             self._robot.automatic_error_recovery()
+
+    def reach(self) -> None:
+        """Reach the robot to look at it; tell it nothing."""
+        with _named(self._library), realtime.kept():
+            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
 
     def look(self, reading: np.ndarray) -> None:
         """Fill a reading of a robot at rest."""

@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import time
+from dataclasses import dataclass, replace
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -18,11 +19,14 @@ from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
-from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
+from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer, corners_of
+from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.tasks.wiping.robot_board import map_shown
 from contactsafe.tasks.wiping.robot_pictures import focal_px, opened
-from contactsafe.vision.lens import Distorted, Lens, Square
+from contactsafe.vision.lens import Distorted, Lens, Square, View
 from contactsafe.vision.opencv import keep_to_one_thread
+from contactsafe.vision.silhouette import on_plane
 
 D455 = Lens(WIDTH, HEIGHT, 639.0, 639.0, 639.5, 359.5, (-0.056, 0.065, 0.0, 0.0, 0.0))
 """Colour pictures of a RealSense D455; three units read from 632 to 646 pixels of focal length, k1 −0.056, k2 0.065."""
@@ -35,20 +39,63 @@ _READY_S = 120.0
 _NAP_S = 0.002
 
 
-class Drawing:
-    """What the camera sees of the board, and of the arm before it.
+@dataclass(frozen=True)
+class Sight:
+    """What a software camera is before.
 
-    Args:
+    Attributes:
         path: of what the board shows.
         arm: that stands before it.
         board, camera: as they are.
         seed: of light and noise.
+        placed: where the camera was calibrated to stand over that board; None for `camera` itself.
     """
 
-    def __init__(self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int):
-        self.shown, self._seed = map_shown(path, board), seed
-        self._photographer = Photographer(camera, board, build_plant(arm, WorldConfig(fixtures=())))
-        self._distorted = Distorted(Square(D455, PHOTO_PX, focal_px(camera)))
+    path: Path
+    arm: Arm
+    board: BoardConfig
+    camera: Camera
+    seed: int
+    placed: PlacedCamera | None = None
+
+    @property
+    def lens(self) -> Lens:
+        """Of the camera."""
+        return D455 if self.placed is None else self.placed.calibration.lens
+
+    def view(self) -> View:
+        """Return what brings its pictures to the policy's view."""
+        return Square(self.lens, PHOTO_PX, focal_px(self.camera)) if self.placed is None else self.placed.view()
+
+
+def camera_over(placed: PlacedCamera) -> Camera:
+    """Return the upright camera at a calibrated one's place that looks at the board, and shows all of it."""
+    board = placed.board
+    x, y, z = placed.calibration.pose_base_camera[:3, 3].tolist()
+    camera = replace(placed.camera, position=(x, y, z), target=board.centre)
+    middle = camera.size / 2.0
+    reach = np.abs(on_plane(corners_of(board), plane_homography(camera, board.centre[2])) - middle).max()
+    return replace(camera, focal_px=camera.focal_px * middle / float(reach))
+
+
+def turned_from(camera: Camera, placed: PlacedCamera) -> np.ndarray:
+    """Return the axes of a calibrated camera in those of one at the same place, (3, 3)."""
+    return camera_axes(camera).T @ placed.calibration.pose_base_camera[:3, :3]
+
+
+class Drawing:
+    """What the camera sees of the board, and of the arm before it.
+
+    Args:
+        sight: as given.
+    """
+
+    def __init__(self, sight: Sight):
+        self.shown, self._seed, placed = map_shown(sight.path, sight.board), sight.seed, sight.placed
+        camera = sight.camera if placed is None else camera_over(placed)
+        self._photographer = Photographer(camera, sight.board, build_plant(sight.arm, WorldConfig(fixtures=())))
+        turned = None if placed is None else turned_from(camera, placed)
+        self._distorted = Distorted(Square(sight.lens, PHOTO_PX, focal_px(camera)), turned)
 
     def picture(self, number: int) -> np.ndarray:
         """Return picture number so and so, uint8 (720, 1280, 3), of now."""
@@ -57,15 +104,11 @@ class Drawing:
         return self._distorted.picture(self._photographer.take(shown["cells"], solids, self._seed, number))
 
 
-def draw_pictures(path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int) -> None:
-    """Be the camera of a run, in a process of its own, until whoever began it has ended.
-
-    Args:
-        path, arm, board, camera, seed: as `Drawing` takes them.
-    """
+def draw_pictures(sight: Sight) -> None:
+    """Be the camera of a run, in a process of its own, until whoever began it has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_to_one_thread()
-    parent, drawing, number = os.getppid(), Drawing(path, arm, board, camera, seed), -1
+    parent, drawing, number = os.getppid(), Drawing(sight), -1
     shown = drawing.shown[0]
     while os.getppid() == parent:
         now = int(shown["tick"]) // _EVERY_TICKS
@@ -82,11 +125,13 @@ class PhotographedBoard:
     """The camera's pictures of the board of `WipedBoard`.
 
     Args:
-        path, arm, board, camera, seed: as `Drawing` takes them.
+        path, arm, board, camera, seed, placed: as `Sight` has them.
     """
 
-    def __init__(self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int):
-        self._seen = (path, arm, board, camera, seed)
+    def __init__(
+        self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int, placed: PlacedCamera | None = None
+    ):
+        self._sight = Sight(path, arm, board, camera, seed, placed)
         self._source: ColourCamera | None = None
         self._process: BaseProcess | None = None
 
@@ -96,11 +141,10 @@ class PhotographedBoard:
         Raises:
             CameraError: its process did not get ready.
         """
-        path, _, board, camera, _ = self._seen
-        self._drawing = Drawing(*self._seen) if lockstep else None
-        self._shown = map_shown(path, board)
-        self._square = Square(D455, PHOTO_PX, focal_px(camera))
-        self._device = SoftwareCamera(D455.fx, D455.fy, D455.cx, D455.cy, D455.distortion)
+        sight, lens = self._sight, self._sight.lens
+        self._drawing = Drawing(sight) if lockstep else None
+        self._shown, self._view = map_shown(sight.path, sight.board), sight.view()
+        self._device = SoftwareCamera(lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion)
         self._source = ColourCamera(sensor=self._device.sensor, profile=self._device.profile)
         self._source.open()
         self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
@@ -110,7 +154,7 @@ class PhotographedBoard:
     def _begin(self) -> None:
         """Start the process that draws, and wait for its first picture."""
         self._process = process = multiprocessing.get_context("spawn").Process(
-            target=draw_pictures, args=self._seen, daemon=True
+            target=draw_pictures, args=(self._sight,), daemon=True
         )
         process.start()
         until = time.monotonic() + _READY_S
@@ -135,7 +179,7 @@ class PhotographedBoard:
         self._device.give(picture, number, 1000.0 * number / 30.0)
         picture, self._number, _ = opened(self._source).newest(_WAIT_MS)
         if picture is not None:
-            self._photo = self._square.cut(picture)
+            self._photo = self._view.cut(picture)
 
     def close(self) -> None:
         """Stop the camera."""

@@ -7,7 +7,8 @@ import numpy as np
 from contactsafe.hardware.realsense import ColourCamera
 from contactsafe.tasks.wiping.board import Camera
 from contactsafe.tasks.wiping.photograph import PHOTO_PX
-from contactsafe.vision.lens import Lens, Square
+from contactsafe.tasks.wiping.placed_camera import PlacedCamera
+from contactsafe.vision.lens import Lens, Square, View
 
 _WAIT_MS = 200
 
@@ -25,15 +26,16 @@ def opened(source: ColourCamera | None) -> ColourCamera:
 
 
 class CameraPictures:
-    """Photographs of a RealSense camera that stands where the policy's camera was in training.
+    """Photographs of a RealSense camera as the policy's camera took them in training.
 
     Args:
         serial: of the camera; None for the first one.
         camera: that the policy was trained with.
+        placed: where the RealSense was calibrated to stand; None where it stands where that camera was.
     """
 
-    def __init__(self, serial: str | None, camera: Camera):
-        self._serial, self._camera = serial, camera
+    def __init__(self, serial: str | None, camera: Camera, placed: PlacedCamera | None = None):
+        self._serial, self._camera, self._placed = serial, camera, placed
         self._source: ColourCamera | None = None
 
     def open(self, lockstep: bool = False) -> None:
@@ -41,9 +43,12 @@ class CameraPictures:
         del lockstep
         self._source = source = ColourCamera(self._serial)
         source.open()
-        lens = source.intrinsics
-        known = Lens(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy, tuple(lens.coeffs))
-        self._square = Square(known, PHOTO_PX, focal_px(self._camera))
+        lens = Lens.of_realsense(source.intrinsics)
+        if self._placed is None:
+            self._view: View = Square(lens, PHOTO_PX, focal_px(self._camera))
+        else:
+            self._placed.refuse_other(lens)
+            self._view = self._placed.view()
         self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
 
     def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
@@ -55,7 +60,7 @@ class CameraPictures:
             source.look_again()
             return self._photo, self._number, math.inf if picture is None else age_ms
         if number != self._number:
-            self._photo, self._number = self._square.cut(picture), number
+            self._photo, self._number = self._view.cut(picture), number
         return self._photo, number, age_ms
 
     def close(self) -> None:
