@@ -16,7 +16,8 @@ from contactsafe.cli.common import BundleFolder, Controllers, TaskName, describe
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse, some_of
 from contactsafe.experiments import registry
-from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig, Taken, sensors_words
+from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig, Taken
+from contactsafe.experiments.sensors import sensors_words
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest

@@ -19,10 +19,9 @@ from contactsafe.experiments.config import (
     Entry,
     ExperimentConfig,
     Progress,
-    require_sensors,
-    sensors_words,
 )
 from contactsafe.experiments.motions import record
+from contactsafe.experiments.sensors import USUAL, require_sensors, sensors_words
 from contactsafe.experiments.verdict_tables import verdict_table, worst_tables
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, length, scalar
@@ -77,7 +76,7 @@ def run_battery(
     progress: Progress | None = None,
     arm: Arm | None = None,
     arm_words: Sequence[str] | None = None,
-    sensors: str = "encoders",
+    sensors: str = USUAL,
 ) -> Experiment:
     """Put controllers through the same collisions. A seed's trial does not depend on the others.
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.sensors import USUAL, require_sensors
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.results.experiment import Experiment
@@ -25,22 +26,6 @@ Progress = Callable[[int], object]
 
 Taken = Literal["task", "bundle", "plants", "sensors", "minutes"]
 """A field of `ExperimentConfig`, and an option of the command line, that not every experiment takes."""
-
-
-def require_sensors(name: str) -> str:
-    """Return the name of sensors as it was given.
-
-    Raises:
-        InvalidInputError: none of `SENSORS` has it.
-    """
-    if name not in SENSORS:
-        raise InvalidInputError(f"sensors = {name!r}; choose from {', '.join(SENSORS)}")
-    return name
-
-
-def sensors_words(name: str) -> list[str]:
-    """Return the words of the command line that ask for sensors, none where they are the default."""
-    return [] if name == ExperimentConfig.sensors else ["--sensors", name]
 
 
 @dataclass(frozen=True)
@@ -65,7 +50,7 @@ class ExperimentConfig:
     trials: int = 10
     seed: int = 0
     plants: tuple[str, ...] = PLANTS
-    sensors: str = "encoders"
+    sensors: str = USUAL
     minutes: float = 60.0
     task: ExperimentTask | None = None
     bundle: Bundle | None = None

@@ -11,11 +11,12 @@ from contactsafe.control import presets
 from contactsafe.control.config import ControllerConfig
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments.again import run_again
-from contactsafe.experiments.config import BATCH, Entry, ExperimentConfig, Progress, require_sensors, sensors_words
+from contactsafe.experiments.config import BATCH, Entry, ExperimentConfig, Progress
 from contactsafe.experiments.motions import Playback, record_rest
 from contactsafe.experiments.push_metrics import METRICS, against, push_metrics
 from contactsafe.experiments.push_scenes import PushedMotion, sample_pushed_motion
 from contactsafe.experiments.push_tables import push_tables
+from contactsafe.experiments.sensors import USUAL, require_sensors, sensors_words
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, length, scalar
 from contactsafe.results.metrics import BASELINE
@@ -72,7 +73,7 @@ def run_pushes(
     progress: Progress | None = None,
     arm: Arm | None = None,
     arm_words: Sequence[str] | None = None,
-    sensors: str = "encoders",
+    sensors: str = USUAL,
 ) -> Experiment:
     """Give controllers the same pushes. A seed's trial does not depend on the others.
 
