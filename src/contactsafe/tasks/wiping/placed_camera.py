@@ -31,10 +31,9 @@ TURNED_RAD = math.radians(20.0)
 _AROUND_M = 0.03
 """By which more than what may be wiped is looked at, on every side."""
 
-ROUND_RAD = math.radians(60.0)
+ROUND_RAD = math.radians(45.0)
 """By which the camera may stand round the board from straight beyond it, where training had it: from further round the
-arm hides what it is about to wipe. What the shipped policy cleans from where is in
-docs/howto/real_robot.md."""
+arm hides what it is about to wipe. What the shipped policy cleans from where is in docs/howto/real_robot.md."""
 
 LEAST_PX_M = 250.0
 """Pixels of the camera to a metre of the board, where it sees it most coarsely."""
