@@ -86,6 +86,8 @@ class Segmenter:
         self._rim = np.ones((2 * ink.rim_px + 1,) * 2, np.uint8)
         board = _board_seen(homography, corners, photo_size)
         self._board = cv2.erode(board, self._rim, borderType=cv2.BORDER_REPLICATE)
+        # Where the picture ends its own pixels may be dark: that is no line.
+        self._inside = cv2.erode(self._board, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
         left, top, width, height = cv2.boundingRect(self._board)
         if width == 0:
             raise InvalidInputError("the homography shows no board in the photograph; calibrate the camera anew")
@@ -158,7 +160,7 @@ class Segmenter:
         usual, noise = _middle_and_spread(hollow, seen)
         core = hollow > cv2.dilate(hollow, np.ones((5, 5), np.uint8)) // 2  # and not what blurs beside it
         dark = hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)
-        candidates = cv2.bitwise_and((dark & core).view(np.uint8), seen)
+        candidates = cv2.bitwise_and((dark & core).view(np.uint8), cv2.bitwise_and(seen, self._inside[self._window]))
         count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]

@@ -220,7 +220,7 @@ def test_a_simulated_run_puts_board_and_camera_where_the_file_says(arm, tmp_path
         np.testing.assert_allclose(run.work.centre, LYING["elsewhere"][:3, 3])
         np.testing.assert_allclose(run.effect._config.centre, LYING["elsewhere"][:3, 3])
         np.testing.assert_allclose(
-            camera_over(run.work.pictures._sight.placed).position, calibration.pose_base_camera[:3, 3]
+            camera_over(run.work.pictures._subject.placed).position, calibration.pose_base_camera[:3, 3]
         )
         assert run.work.placed.calibration is calibration
     finally:
