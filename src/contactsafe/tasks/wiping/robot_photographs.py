@@ -116,7 +116,7 @@ def draw_pictures(subject: Subject) -> None:
             time.sleep(_NAP_S)
             continue
         number, slot = now, now % 2
-        shown["taken"][slot] = 0
+        shown["taken"][slot], shown["taken_tick"][slot] = 0, shown["tick"]
         shown["pictures"][slot] = drawing.picture(number)
         shown["taken"][slot] = number + 1
 
@@ -147,7 +147,7 @@ class PhotographedBoard:
         self._device = SoftwareCamera(lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion)
         self._source = ColourCamera(sensor=self._device.sensor, profile=self._device.profile)
         self._source.open()
-        self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
+        self._photo, self._number, self._tick = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1, 0
         if not lockstep:
             self._begin()
 
@@ -167,16 +167,18 @@ class PhotographedBoard:
         """Return the newest picture; in lockstep it is taken where the time for one has come."""
         number = tick // _EVERY_TICKS if self._drawing else int(self._shown["taken"].max()) - 1
         if number not in (self._number, -1):
-            self._take(number)
-        return self._photo, self._number, float(max(tick - self._number * _EVERY_TICKS, 0))
+            self._take(number, tick)
+        return self._photo, self._number, float(max(tick - self._tick, 0))
 
-    def _take(self, number: int) -> None:
+    def _take(self, number: int, tick: int) -> None:
         """Hand a picture to the device, and take it from there as that of a real one."""
         slot = number % 2
+        taken = tick if self._drawing else int(self._shown["taken_tick"][0, slot])
         picture = self._drawing.picture(number) if self._drawing else self._shown["pictures"][0, slot].copy()
         if not self._drawing and self._shown["taken"][0, slot] != number + 1:
             return  # the next one was drawn into it meanwhile
         self._device.give(picture, number, 1000.0 * number / 30.0)
+        self._tick = taken
         picture, self._number, _ = opened(self._source).newest(_WAIT_MS)
         if picture is not None:
             self._photo = self._view.cut(picture)
