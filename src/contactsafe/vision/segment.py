@@ -86,8 +86,6 @@ class Segmenter:
         self._rim = np.ones((2 * ink.rim_px + 1,) * 2, np.uint8)
         board = _board_seen(homography, corners, photo_size)
         self._board = cv2.erode(board, self._rim, borderType=cv2.BORDER_REPLICATE)
-        # Where the picture ends its own pixels may be dark: that is no line.
-        self._inside = cv2.erode(self._board, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
         left, top, width, height = cv2.boundingRect(self._board)
         if width == 0:
             raise InvalidInputError("the homography shows no board in the photograph; calibrate the camera anew")
@@ -153,14 +151,17 @@ class Segmenter:
 
     def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
-        smooth = cv2.min(cv2.GaussianBlur(darkest, (5, 5), _LINE_BLUR_PX), background)  # between reflections is no line
+        # Beside the arm, and where the picture ends, its pixels are dark by what is beyond: that is no line.
+        seen = cv2.erode(seen, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+        smooth = cv2.min(darkest, background)  # nor is what lies between two reflections
         np.copyto(smooth, background, where=seen == 0)
+        smooth = cv2.bitwise_and(cv2.GaussianBlur(smooth, (5, 5), _LINE_BLUR_PX), seen)
         sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
         hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
         usual, noise = _middle_and_spread(hollow, seen)
         core = hollow > cv2.dilate(hollow, np.ones((5, 5), np.uint8)) // 2  # and not what blurs beside it
         dark = hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)
-        candidates = cv2.bitwise_and((dark & core).view(np.uint8), cv2.bitwise_and(seen, self._inside[self._window]))
+        candidates = cv2.bitwise_and((dark & core).view(np.uint8), seen)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]
