@@ -22,7 +22,7 @@ from contactsafe.tasks.wiping.camera import camera_axes, plane_homography
 from contactsafe.tasks.wiping.photograph import corners_of
 from contactsafe.tasks.wiping.placed_camera import TILT_RAD, PlacedCamera
 from contactsafe.tasks.wiping.robot import WipingRobot
-from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard, camera_over, turned_from
+from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard, camera_over, turned_from
 from contactsafe.tasks.wiping.robot_work import WipingWork
 from contactsafe.vision.camera_calibration import CameraCalibration
 from contactsafe.vision.camera_pose import find_camera
@@ -219,7 +219,9 @@ def test_a_simulated_run_puts_board_and_camera_where_the_file_says(arm, tmp_path
         np.testing.assert_allclose(bench.position, LYING["elsewhere"][:3, 3])
         np.testing.assert_allclose(run.work.centre, LYING["elsewhere"][:3, 3])
         np.testing.assert_allclose(run.effect._config.centre, LYING["elsewhere"][:3, 3])
-        np.testing.assert_allclose(run.work.pictures._camera.position, calibration.pose_base_camera[:3, 3])
+        np.testing.assert_allclose(
+            camera_over(run.work.pictures._subject.placed).position, calibration.pose_base_camera[:3, 3]
+        )
         assert run.work.placed.calibration is calibration
     finally:
         run.close()

@@ -15,7 +15,8 @@ from contactsafe.tasks.base.robot import Simulated, met_by
 from contactsafe.tasks.wiping.config import WipingConfig
 from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
-from contactsafe.tasks.wiping.robot_pictures import CameraPictures, PhotographedBoard
+from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
+from contactsafe.tasks.wiping.robot_pictures import CameraPictures
 from contactsafe.tasks.wiping.robot_work import WipingWork
 
 
