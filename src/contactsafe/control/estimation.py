@@ -209,6 +209,8 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
     c.state.touch.withholds = c.state.touch.touching
     c.output.kind = c.state.touch.kind
     report_touch(c.state, c.output)
+    if c.output.touched != 0:
+        c.output.link = c.output.touched
 
 
 @inlined
@@ -220,7 +222,7 @@ def report_touch(state: Record, out: Record) -> None:
     """
     touch, place = state.touch, state.localisation
     out.probability, out.several, out.touched = 1.0, 0, 0
-    out.point[:], out.force[:] = math.nan, 0.0
+    out.point[:], out.force[:] = 0.0, 0.0
     if touch.touching == 0 or place.best < 0:
         return
     out.probability = place.tool_probability if out.kind == TOOL else 1.0 - place.tool_probability
