@@ -200,15 +200,20 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
     J_bar = matmul(J_M_inv.T, Lambda)
     estimate(c, J_bar)
     report_arm(c)
-    if c.state.clock.bridged > 0:
-        return
+    if c.state.clock.bridged == 0:
+        _feel_alone(c.state, c, J_bar)
+
+
+@inlined
+def _feel_alone(state: Record, c: Record, J_bar: Matrix) -> None:
+    """Report what touches arm or tool where no law goes by it."""
     follow_tool_force(
-        c.state.tool_wrench, c.state.arm, c.state.mode, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain
+        state.tool_wrench, state.arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain
     )
     follow_touch(c)
-    c.state.touch.withholds = c.state.touch.touching
-    c.output.kind = c.state.touch.kind
-    report_touch(c.state, c.output)
+    state.touch.withholds = state.touch.touching
+    c.output.kind = state.touch.kind
+    report_touch(state, c.output)
     if c.output.touched != 0:
         c.output.link = c.output.touched
 
