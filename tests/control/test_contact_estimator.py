@@ -302,7 +302,6 @@ def test_an_arm_whose_surface_nobody_knows_has_a_link_and_no_place(arm):
     assert np.isnan(contact.point).all()
 
 
-
 def test_a_copy_goes_on_by_itself(arm, estimator):
     torque, _ = push_on(arm, 5, (0.0, 25.0, 0.0))
     feel(estimator, still(arm), 200)
