@@ -107,10 +107,10 @@ def estimate(c: Record, J_bar: Matrix) -> None:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:
         pushed = is_active(state.contact_work) and _is_beside_tool(state, J_bar, params.identification)
-        memory_gain = state.step.tool_memory_gain if state.mode == FREE and not pushed else 0.0
         separate_tool_wrench(
-            tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, pushed, params.identification
-        )
+            tool, detection.residual, observer, dynamics.J, J_bar, state.mode, pushed, state.step,
+            params.identification,
+        )  # fmt: skip
     follow_change(c)
     supervise(c)
     _identify(c)
