@@ -100,7 +100,7 @@ def classify(
 
 @inlined
 def _comes_back(classification: Record, far: float) -> bool:
-    """Tell whether the arm moves into the contact: beyond where it last stopped doing so, or far from where it receded."""
+    """Tell whether the arm moves into the contact: on from where it last stopped, or far from where it receded to."""
     displacement = classification.displacement_smooth_rad
     classification.furthest_rad = max(classification.furthest_rad, displacement)
     return displacement <= 0.0 or displacement < classification.furthest_rad - far
@@ -167,7 +167,7 @@ def goes_on(drop: float, displacement: float, torque: float, taken_j: float, sof
     """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
     A spring that took A joules to come to a torque of τ loses τ² / (2 A) for every radian that the arm recedes; a push
-    goes on. So does one that is softer than anything that counts as an obstacle. Half of that draws the line, and it must
+    goes on. So does what is softer than anything that counts as an obstacle. Half of that draws the line, and it must
     stand out.
 
     Args:
