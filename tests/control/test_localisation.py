@@ -15,14 +15,16 @@ from contactsafe.core.compiled import compiled
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
 NORMAL_N, ACROSS_N = 30.0, 10.0
+NO_BASE = np.zeros(1, wrench_information.told_base_dtype)
 
 
 @compiled
-def _localise(places, handles, torque, sigma, q, prior, times):
+def _localise(places, handles, torque, sigma, q, prior, times, bases):
     localisation.forget_place(places[0])
     for _ in range(times):
         variance = evidence.moment_variance(torque)
-        localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, prior, 1.0)
+        known = Uncertainty(sigma, variance)
+        localisation.localise(places[0], handles[0], torque, known, bases[0], q, 1.0, prior, 1.0)
 
 
 @compiled
@@ -74,9 +76,9 @@ class Bench:
         told = np.zeros(1, wrench_information.information_dtype(self.arm.n))
         return _evidence(self.handles, told, index, torque, sigma, variance, point, force), force
 
-    def localised(self, torque, sigma, prior=0.02):
+    def localised(self, torque, sigma, prior=0.02, bases=NO_BASE):
         places = np.zeros(1, localisation_dtype(self.arm.n))
-        _localise(places, self.handles, torque, np.full(self.arm.n, sigma), self.q, prior, 1)
+        _localise(places, self.handles, torque, np.full(self.arm.n, sigma), self.q, prior, 1, bases)
         return places[0]
 
 
@@ -190,7 +192,8 @@ def _forget(places, q):
 
 @compiled
 def _go_on(places, handles, torque, sigma, variance, q):
-    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, 0.02, 1.0)
+    base = places[0].base  # of before: nothing is told
+    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), base, q, 1.0, 0.02, 1.0)
 
 
 def test_postures_add_up_as_the_torques_of_one_force_that_turns_with_the_link(panda):
@@ -235,8 +238,8 @@ def test_what_was_told_of_another_force_is_forgotten(panda):
 
 @compiled
 def _elsewhere(places, handles, torque, sigma, q):
-    variance = evidence.moment_variance(torque)
-    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 0.5, 0.02, 1.0)
+    known, base = Uncertainty(sigma, evidence.moment_variance(torque)), places[0].base
+    localisation.localise(places[0], handles[0], torque, known, base, q, 0.5, 0.02, 1.0)
 
 
 def test_a_sweep_compares_all_points_by_the_same_torque(panda):
@@ -252,5 +255,5 @@ def test_a_sweep_compares_all_points_by_the_same_torque(panda):
 
 @compiled
 def _part(places, handles, torque, sigma, q):
-    variance = evidence.moment_variance(torque)
-    localisation.localise(places[0], handles[0], torque, Uncertainty(sigma, variance), q, 1.0, 0.02, 0.001)
+    known, base = Uncertainty(sigma, evidence.moment_variance(torque)), places[0].base
+    localisation.localise(places[0], handles[0], torque, known, base, q, 1.0, 0.02, 0.001)

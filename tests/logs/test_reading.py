@@ -67,6 +67,15 @@ def test_what_is_not_needed_may_be_missing(tmp_path):
     assert log.qd is None
     assert log.torque is None
     assert log.wrench_ee is None
+    assert log.wrench_base is None
+
+
+def test_a_wrench_at_the_base_is_read_by_its_name_or_another(tmp_path):
+    at_base = RNG.normal(size=(ROWS, 6))
+    columns = {"t": TIME, "q_{}": ARRAYS["q"], "tau_{}": ARRAYS["torque"], "wrench_base_{}": at_base}
+    np.testing.assert_allclose(read_log(csv_of(tmp_path / "log.csv", columns)).wrench_base, at_base)
+    np.savez(tmp_path / "log.npz", time=TIME, **ARRAYS, stand=at_base)
+    np.testing.assert_array_equal(read_log(tmp_path / "log.npz", {"wrench_base": "stand"}).wrench_base, at_base)
 
 
 @pytest.mark.parametrize(
@@ -80,6 +89,7 @@ def test_what_is_not_needed_may_be_missing(tmp_path):
         ({"time": TIME[::-1], **ARRAYS}, None, "time does not go on at row 1"),
         ({"time": 1e6 * TIME + 1e5 * np.arange(ROWS), **ARRAYS}, None, "give it in seconds"),
         ({"time": TIME, **ARRAYS, "qd": ARRAYS["qd"][:, :6]}, None, r"'qd' has shape \(60, 6\); give \(60, 7\)"),
+        ({"time": TIME, **ARRAYS, "wrench_base": ARRAYS["q"]}, None, r"'wrench_base' has shape .*; give \(60, 6\)"),
         ({"time": TIME, **ARRAYS, "qd": ARRAYS["qd"][:50]}, None, r"'qd' has shape \(50, 7\)"),
         ({"time": TIME[:20], "q": ARRAYS["q"][:20]}, None, "has 20 rows; give at least 50"),
         (

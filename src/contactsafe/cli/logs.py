@@ -27,7 +27,8 @@ class LogOptions:
     """What can be said of a log.
 
     Attributes:
-        log: a CSV, NPZ or MCAP file with time, q, and torque or command; qd and wrench_ee where there are any.
+        log: a CSV, NPZ or MCAP file with time, q, and torque or command; qd, wrench_ee and wrench_base where there
+            are any.
         robot: panda, fr3, or the path of an MJCF or URDF file.
         tool: what a Franka's flange carries: hand, wiper, or flange for nothing.
         site: end-effector point of an MJCF file, or link of a URDF file.

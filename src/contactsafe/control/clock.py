@@ -7,7 +7,7 @@ wrong: then the joints tell the time. `docs/concepts/clocks.md` derives the boun
 
 import numpy as np
 
-from contactsafe.control.codes import CLOCK, MISSING, OVERDUE, REPEATED, UNTRUE
+from contactsafe.control.codes import BAD_BASE, CLOCK, MISSING, OVERDUE, REPEATED, UNTRUE
 from contactsafe.control.pace import PACE_UNKNOWN, learn_pace, ticks_from_motion
 from contactsafe.control.plausibility import (
     BRIDGE_TICKS,
@@ -180,6 +180,11 @@ def _accept(state: Record, m: Record, dt: float, since: float, timed: bool) -> N
     arm.has_torque = 1 if m.has_torque != 0 and all_usable(m.torque) else 0
     if arm.has_torque != 0:
         arm.torque[:] = m.torque
+    arm.has_base = 1 if m.has_base != 0 and all_usable(m.wrench_base) else 0
+    if arm.has_base != 0:
+        arm.wrench_base[:] = m.wrench_base
+    elif m.has_base != 0 and state.fault == 0:
+        state.fault = BAD_BASE
 
 
 @compiled

@@ -8,7 +8,7 @@ KINDS = {NO_CONTACT: "none", OBSTACLE: "obstacle", PUSH: "push", TOOL: "tool"}
 """What a contact is classified as. One on the arm counts as an obstacle until it has shown that it pushes."""
 
 BAD_MEASUREMENT, BAD_TARGET, BAD_QUATERNION, BAD_GAIN, MISSING, NO_TORQUE = 1, 2, 3, 4, 5, 6
-REPEATED, OVERDUE, UNTRUE, LOAD, RUNAWAY, CLOCK = 7, 8, 9, 10, 11, 12
+REPEATED, OVERDUE, UNTRUE, LOAD, RUNAWAY, CLOCK, BAD_BASE = 7, 8, 9, 10, 11, 12, 13
 FAULTS = {
     0: "none",
     BAD_MEASUREMENT: "a measurement is not finite or beyond what the arm can do; it was bridged by a prediction",
@@ -23,6 +23,7 @@ FAULTS = {
     LOAD: "a load, or a push like one, that the controller was not told of keeps the tool off; see payload_estimate()",
     RUNAWAY: "a joint stays beyond its speed limit though it is braked: the arm runs away; it is damped, nothing else",
     CLOCK: "the time of a measurement stood or went back while the joints went on; they tell the time instead",
+    BAD_BASE: "the wrench at the base is not finite or absurdly large; contacts are placed without it, nothing else",
 }
 """What `fault` in the state and output means. The first is latched until reset, but what brakes the arm replaces it:
 MISSING, REPEATED, OVERDUE, UNTRUE and RUNAWAY; and so does LOAD where nothing brakes, which goes once it is told."""

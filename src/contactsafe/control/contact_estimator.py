@@ -112,9 +112,11 @@ class ContactEstimator(Instance):
 
 def _whole(measurement: Measurement, command: ArrayLike | None) -> Measurement:
     """Return a measurement without a sensor that is broken; positions and velocities are the tick's to refuse."""
-    wrench, torque = measurement.wrench_ee, measurement.torque
+    wrench, torque, base = measurement.wrench_ee, measurement.torque, measurement.wrench_base
     if wrench is not None and not np.isfinite(wrench).all():
         measurement = measurement._replace(wrench_ee=None)
+    if base is not None and not np.isfinite(shaped(base, 6, "wrench_base")).all():
+        measurement = measurement._replace(wrench_base=None)
     if torque is not None and command is not None and not np.isfinite(torque).all():
         measurement = measurement._replace(torque=None)
     return measurement

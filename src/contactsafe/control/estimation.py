@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from contactsafe.control.base_wrench import observe_base
 from contactsafe.control.classification import contact_kind
 from contactsafe.control.clock import narrow_band, receive, set_step
 from contactsafe.control.codes import BAD_MEASUREMENT, FREE, LOAD, RUNAWAY, TOOL
@@ -97,6 +98,7 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     went_on = observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params)
     if state.clock.bridged > 0:
         return
+    observe_base(state.base, c.handle, state, dynamics, params)
     set_thresholds(detection, observer, masses.gravity_sigma, state.arm, dynamics.CT_qd, params)
     if went_on:
         follow_noise(

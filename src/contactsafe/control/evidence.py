@@ -47,7 +47,12 @@ class Uncertainty(NamedTuple):
 @compiled
 def moment_variance(torque: Vector) -> float:
     """Return the variance of the moment that a contact has about the nearest point of the grid, N² m²."""
-    force = math.sqrt(dot(torque, torque)) / _LEVER_M
+    return moment_variance_of(math.sqrt(dot(torque, torque)) / _LEVER_M)
+
+
+@compiled
+def moment_variance_of(force: float) -> float:
+    """Return the same where the force is known, N² m²."""
     return (_GRID_M * force) ** 2 + 1e-6
 
 
@@ -203,6 +208,25 @@ def left_over(handle: Record, link: int, torque: Vector, known: Uncertainty, poi
             left -= a[0] * (y * force[2] - z * force[1])
             left -= a[1] * (z * force[0] - x * force[2]) + a[2] * (x * force[1] - y * force[0])
         squared += left * left / (known.sigma[i] * known.sigma[i] + known.moment_variance)
+    return squared
+
+
+@compiled
+def base_left_over(base: Record, moment_variance: float, point: Vector, force: Vector) -> float:
+    """Return what a force leaves over of the wrench at the base, as `left_over` does of the joints' torque.
+
+    Args:
+        base: `told_base_dtype` record, its wrench known.
+        moment_variance: as of `Uncertainty`, N² m².
+        point, force: world, (3,) m and N.
+    """
+    squared = 0.0
+    for k in range(3):
+        u, v = (k + 1) % 3, (k + 2) % 3
+        left = base.wrench[k] - force[k]
+        turned = base.wrench[3 + k] - (point[u] * force[v] - point[v] * force[u])
+        squared += left * left / (base.sigma[k] * base.sigma[k])
+        squared += turned * turned / (base.sigma[3 + k] * base.sigma[3 + k] + moment_variance)
     return squared
 
 

@@ -97,6 +97,9 @@ class Instance(Independent):
         seen["has_torque"][...] = measurement.torque is not None
         if measurement.torque is not None:
             seen["torque"][:] = shaped(measurement.torque, self.arm.n, "torque")
+        seen["has_base"][...] = measurement.wrench_base is not None
+        if measurement.wrench_base is not None:
+            seen["wrench_base"][:] = shaped(measurement.wrench_base, 6, "wrench_base")
         seen["has_time"][...] = measurement.time is not None
         if measurement.time is not None:
             seen["time"][...] = seconds(measurement.time)

@@ -1,4 +1,4 @@
-"""Localisation: where on the arm or its tool something touches it, and with what force, as far as torques can tell.
+"""Localisation: where on the arm or its tool something touches it, and with what force, as far as sensors can tell.
 
 All places are compared by their `evidence`: a grid filter over the surface, in place of the particles of Manuelli &
 Tedrake 2016. Several may explain the torques of one posture alike; as the arm moves on, what the postures before told
@@ -13,13 +13,20 @@ import numpy as np
 from contactsafe.control.baseline import distance
 from contactsafe.control.evidence import (
     Uncertainty,
+    base_left_over,
     compare_into,
     force_into,
     left_over,
     link_of,
     most_by_noise,
 )
-from contactsafe.control.wrench_information import inform, information_dtype, marginalise_moment
+from contactsafe.control.wrench_information import (
+    inform,
+    inform_of_base,
+    information_dtype,
+    marginalise_moment,
+    told_base_dtype,
+)
 from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_vector
@@ -66,6 +73,7 @@ def localisation_dtype(n: int) -> np.dtype:
             ("next", _i),  # place to be compared next
             ("torque", _f, (n,)),  # with which all places of a sweep are compared, N m
             ("sigma", _f, (n,)),  # its standard deviation, N m
+            ("base", told_base_dtype),  # with which they are compared as well
             ("moment_variance", _f),  # see `Uncertainty`
             ("tool_prior", _f),  # probability of the tool beforehand
             ("turn", _i),  # sweeps over all places since the contact began
@@ -90,8 +98,8 @@ def forget_place(place: Record) -> None:
 
 @compiled
 def localise(
-    place: Record, handle: Record, torque: Vector, known: Uncertainty, q: Vector, weight: float, tool_prior: float,
-    dt: float,
+    place: Record, handle: Record, torque: Vector, known: Uncertainty, base: Record, q: Vector, weight: float,
+    tool_prior: float, dt: float,
 ) -> None:  # fmt: skip
     """Compare the next places of the surface, all of them in the first tick of a contact.
 
@@ -99,6 +107,7 @@ def localise(
         place: `localisation_dtype` record; advanced.
         handle: of the nominal model, up to date.
         torque, known: external, (n,), N m, and how well it is known.
+        base: what a sensor under the base tells: a record that has the fields of `told_base_dtype`.
         q, dt: posture, (n,), rad, and the time that passed, s.
         weight: of the baseline here, 0 … 1.
         tool_prior: probability of the tool before anything is known.
@@ -107,7 +116,9 @@ def localise(
     if place.next == 0:
         place.torque[:], place.sigma[:], place.moment_variance = torque, known.sigma, known.moment_variance
         place.tool_prior = tool_prior
+        place.base.told, place.base.wrench[:], place.base.sigma[:] = base.told, base.wrench, base.sigma
         inform(place.now, handle, torque, known.sigma)
+        inform_of_base(place.now, handle, place.base)
         _remember(place, q, weight)
         _add_up(place)
     stop = points if place.turn == 0 else min(place.next + round(_POINTS_A_S * dt), points)
@@ -171,20 +182,30 @@ def _conclude(place: Record, handle: Record, n: int, points: int) -> None:
 def _check(place: Record, handle: Record, known: Uncertainty) -> None:
     """Tell whether what is remembered contradicts the torques of now, and how well any single contact explains these.
 
-    A single contact leaves n − 3 numbers free.
+    A single contact leaves n − 3 numbers free, and six more by a sensor under the base.
     """
     n = place.torque.shape[0]
-    link, free = min(place.link, n), n - 3.0
+    link, told = min(place.link, n), n + (6.0 if place.base.told != 0 else 0.0)
+    free = told - 3.0
     point, force = stack_vector(3), stack_vector(3)
     force_into(handle, place.all, place.best, n, point, force)
-    left = left_over(handle, link, place.torque, known, point, force)
-    place.differs = 1 if left > most_by_noise(float(n)) else 0
+    left = _left_of_all(place, handle, link, known, point, force)
+    place.differs = 1 if left > most_by_noise(told) else 0
     if free < 1.0:
         return
     marginalise_moment(place.now.G[link - 1], place.now.h[link - 1], known.moment_variance)
     force_into(handle, place.now, place.best, n, point, force)
-    left = left_over(handle, link, place.torque, known, point, force) / most_by_noise(free)
+    left = _left_of_all(place, handle, link, known, point, force) / most_by_noise(free)
     place.left_over += (1.0 if place.turn == 1 else _CHECK) * (left - place.left_over)
+
+
+@compiled
+def _left_of_all(place: Record, handle: Record, link: int, known: Uncertainty, point: Vector, force: Vector) -> float:
+    """Return what a force on a link leaves over of torques and wrench at the base."""
+    left = left_over(handle, link, place.torque, known, point, force)
+    if place.base.told != 0:
+        left += base_left_over(place.base, known.moment_variance, point, force)
+    return left
 
 
 @compiled

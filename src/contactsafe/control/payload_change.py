@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from contactsafe.control.base_wrench import forget_base
 from contactsafe.control.codes import FREE, LOAD
 from contactsafe.control.link_masses import reset_link_masses
 from contactsafe.control.observer import rebase_momentum
@@ -45,6 +46,7 @@ def take_up(controllers: np.ndarray, index: int, weight: Vector) -> None:
         switch(state, FREE)
     reset_link_masses(state.link_masses, c.params.identification.mass_variance)
     reset_payload(state.payload)
+    forget_base(state.base)
     if state.fault == LOAD:
         state.fault = 0
 

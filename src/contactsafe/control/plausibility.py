@@ -40,7 +40,8 @@ _STUCK_RAD = 2e-5
 def is_usable(m: Record, arm: Record, braking: int) -> bool:
     """Tell whether every number of a measurement is one that this arm can have.
 
-    A broken sensor of force or torque stops the arm, but it is braked by its joints, which are still seen.
+    A broken sensor of force or torque stops the arm, but it is braked by its joints, which are still seen. One under
+    the base does not: no law needs it.
 
     Args:
         m: `measurement_dtype` record.

@@ -8,6 +8,7 @@ import functools
 
 import numpy as np
 
+from contactsafe.control.base_wrench import base_wrench_dtype
 from contactsafe.control.baseline import baseline_dtype
 from contactsafe.control.classification import classification_dtype
 from contactsafe.control.clock import clock_dtype
@@ -43,6 +44,8 @@ def measurement_dtype(n: int) -> np.dtype:
             ("has_time", _i),  # 0 where that is not known
             ("torque", _f, (n,)),  # at the joints, behind the gears, N m
             ("has_torque", _i),  # 0 where no sensor says it
+            ("wrench_base", _f, (6,)),  # arm on its base, about the world's origin, world axes, N and N m
+            ("has_base", _i),  # 0 where no sensor is there
         ]
     )
 
@@ -71,6 +74,8 @@ def arm_state_dtype(n: int) -> np.dtype:
             ("has_wrench", _i),
             ("torque", _f, (n,)),  # last good one, N m
             ("has_torque", _i),
+            ("wrench_base", _f, (6,)),  # last good one
+            ("has_base", _i),
         ]
     )
 
@@ -103,6 +108,7 @@ def state_dtype(n: int) -> np.dtype:
             ("isolation", isolation_dtype(n)),
             ("tool_wrench", tool_wrench_dtype(n)),
             ("baseline", baseline_dtype(n)),
+            ("base", base_wrench_dtype(n)),
             ("touch", touch_dtype(n)),
             ("localisation", localisation_dtype(n)),
             ("link_masses", link_masses_dtype(n)),

@@ -20,6 +20,10 @@ class Measurement(NamedTuple):
             counts as one tick of time, unless the joints went further than that.
         torque: joint torque measured behind the gears, where the links begin, gravity included, (n,), N m: Franka's
             `tau_J`. None without such sensors: then the command stands for it, less friction and what the rotors take.
+        wrench_base: wrench that the arm exerts on what it stands on, about the world's origin, where its base is, world
+            axes, (6,), N and N m: at rest its weight, (0, 0, −m g) and the moment of that; in motion what the links'
+            acceleration takes is in it too, as a sensor under the base shows it. A constant beside it, such as the
+            weight of the base itself or the sensor's bias, is learned. None without such a sensor.
     """
 
     q: np.ndarray
@@ -27,6 +31,7 @@ class Measurement(NamedTuple):
     wrench_ee: np.ndarray | None = None
     time: float | None = None
     torque: np.ndarray | None = None
+    wrench_base: np.ndarray | None = None
 
 
 class Target(NamedTuple):
@@ -60,7 +65,7 @@ class Contact(NamedTuple):
         point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints. By a
             controller it may lie beside `link`, which its law goes by.
             `ContactEstimator.places()` gives the others that explain the torques.
-        force: of the environment there, as far as joint torques tell it, world, (3,), N.
+        force: of the environment there, as far as joint torques and a sensor under the base tell it, world, (3,), N.
         bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
         several: whether no single contact explains the torques, so that arm or tool is touched in two places at least.
             Two contacts often do look like one: no is no proof.

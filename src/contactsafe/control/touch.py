@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from contactsafe.control.base_offset import follow_base_change
 from contactsafe.control.baseline import follow_baseline
 from contactsafe.control.codes import FREE, NO_CONTACT, OBSTACLE, PUSH, REJECT, TOOL
 from contactsafe.control.detection import GRAVITY_SIGMAS
-from contactsafe.control.evidence import Uncertainty, moment_variance
+from contactsafe.control.evidence import Uncertainty, moment_variance, moment_variance_of
 from contactsafe.control.localisation import forget_place, localise
 from contactsafe.core.arrays import Record
 from contactsafe.core.compiled import inlined
@@ -65,12 +66,20 @@ def follow_touch(c: Record) -> None:
         touch.touching, touch.ticks = 1 if began else 0, 0
         forget_place(place)
     if touch.touching != 0 and c.handle.place_points > c.handle.tool_places:
-        known = Uncertainty(touch.sigma, moment_variance(touch.torque))
         localise(
-            place, c.handle, touch.torque, known, state.arm.q, state.baseline.weight,
-            _tool_prior(state, params.observer), state.step.dt,
+            place, c.handle, touch.torque, _uncertainty(touch, state.base), state.base, state.arm.q,
+            state.baseline.weight, _tool_prior(state, params.observer), state.step.dt,
         )  # fmt: skip
     touch.kind = _kind(touch, place, state, params.classification.tool_contact_n)
+
+
+@inlined
+def _uncertainty(touch: Record, base: Record) -> Uncertainty:
+    """Return how well torques of this size are known; a sensor under the base tells the size of the force itself."""
+    variance = moment_variance(touch.torque)
+    if base.told != 0:
+        variance = moment_variance_of(math.sqrt(dot(base.wrench[:3], base.wrench[:3])))
+    return Uncertainty(touch.sigma, variance)
 
 
 @inlined
@@ -101,6 +110,7 @@ def follow_change(c: Record) -> None:
         model = detection.model_uncertainty[i] / _MODEL_SIGMAS
         variance = _LEAST_NM**2 + noise * noise + bias * bias + model * model + left * left
         touch.torque[i], touch.sigma[i] = changed, math.sqrt(variance + (_SCALE * changed) ** 2)
+    follow_base_change(state.base, c.handle, state, c.params, untouched)
 
 
 @inlined

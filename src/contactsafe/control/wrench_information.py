@@ -1,8 +1,9 @@
-"""What joint torques tell of a wrench on each link, in the link's own frame: there it adds up over postures.
+"""What sensors tell of a wrench on each link, in the link's own frame: there it adds up over postures.
 
 A joint with axis a through o, both in the frame of a link beyond it, feels w · (f, m) of a force f and a moment m about
 the link's origin, w = (o × a, a). Torques τ with standard deviations σ tell of that wrench the information matrix
-G = Σ w wᵀ / σ² and the vector h = Σ w τ / σ².
+G = Σ w wᵀ / σ² and the vector h = Σ w τ / σ². A sensor under the base adds six such rows: of a moment about each
+axis of the world, felt by w as if a joint turned about it, and of a force along it, felt by w = (a, 0).
 """
 
 import math
@@ -26,6 +27,16 @@ def information_dtype(n: int) -> np.dtype:
             ("h", _f, (n, 6)),  # 1/N, 1/(N m)
         ]
     )
+
+
+told_base_dtype = np.dtype(
+    [
+        ("told", np.int64),  # 0 where nothing is known of it
+        ("wrench", _f, (6,)),  # external, about the world's origin, world axes, N and N m
+        ("sigma", _f, (6,)),  # its standard deviation
+    ]
+)
+"""Describe what a sensor under the base tells."""
 
 
 @compiled
@@ -62,6 +73,42 @@ def inform_of(handle: Record, link: int, torque: Vector, sigma: Vector, G: Matri
             h[j] += weight * torque[i] * w[j]
             for k in range(6):
                 G[j, k] += weight * w[j] * w[k]
+
+
+@compiled
+def inform_of_base(told: Record, handle: Record, base: Record) -> None:
+    """Add what the wrench at the base tells of a wrench on each link; nothing where it is not known.
+
+    Args:
+        told: `information_dtype` record.
+        handle: of the nominal model, up to date.
+        base: `told_base_dtype` record.
+    """
+    if base.told == 0:
+        return
+    w = stack_vector(6)
+    for link in range(told.h.shape[0]):
+        body, G, h = handle.first_body + link, told.G[link], told.h[link]
+        R, origin = view2(handle.xmat, handle.nbody, 9)[body], view2(handle.xpos, handle.nbody, 3)[body]
+        for k in range(3):
+            axis = R[3 * k : 3 * k + 3]  # of the world in the link's frame
+            w[:3], w[3:] = axis, 0.0
+            _add(G, h, w, base.wrench[k], base.sigma[k])
+            x, y = (k + 1) % 3, (k + 2) % 3
+            for j in range(3):  # the axis times where the link is, (e × o) in its frame
+                w[j] = R[3 * y + j] * origin[x] - R[3 * x + j] * origin[y]
+            w[3:] = axis
+            _add(G, h, w, base.wrench[3 + k], base.sigma[3 + k])
+
+
+@inlined
+def _add(G: Matrix, h: Vector, w: Vector, value: float, sigma: float) -> None:
+    """Add one row's information."""
+    weight = 1.0 / (sigma * sigma)
+    for j in range(6):
+        h[j] += weight * value * w[j]
+        for k in range(6):
+            G[j, k] += weight * w[j] * w[k]
 
 
 @compiled

@@ -30,10 +30,10 @@ from contactsafe.experiments.touch_limit import (
     spacing,
 )
 from contactsafe.experiments.touch_scenes import (
-    FRANKA_SENSORS,
     MOVED,
     MOVED_MS,
     QUIET_SENSORS,
+    REAL_SENSORS,
     REST_MS,
     STILL,
     STILL_MS,
@@ -41,6 +41,7 @@ from contactsafe.experiments.touch_scenes import (
     TouchScene,
     sample_touch_scene,
     sense,
+    true_base_wrench,
     true_torque,
 )
 from contactsafe.results.experiment import Experiment, Trial
@@ -50,10 +51,14 @@ from contactsafe.robot.shape import link_frames
 NAME = "localisation"
 QUESTION = (
     "A random point of links 3 to 7 is touched with 10 to 60 N and stays touched while the tool moves 10 to 15 cm; of "
-    "the arm only its joints' positions, velocities and torques are known: where is the contact, and how strong?"
+    "the arm only its joints' positions, velocities and torques are known, or the wrench at its base as well: where is "
+    "the contact, and how strong?"
 )
 ZERO, NONE = "wrench of zero", "no wrench"
 """The force sensor at the wrist says that nothing touches the tool, or there is none."""
+
+BASE = ", base sensor"
+"""Behind either: what the sensor under the base says is known as well."""
 
 TWO = "two contacts"
 
@@ -98,8 +103,9 @@ ENTRY = Entry(
 
 
 def _scenarios(contacts: int) -> list[tuple[str, str]]:
-    """Return what is known of the wrist, and when is looked, for one contact or two."""
-    return [(wrench, when) for wrench in ((ZERO, NONE) if contacts == 1 else (ZERO,)) for when in _LOOKED_AT]
+    """Return what is known of wrist and base, and when is looked, for one contact or two."""
+    wrists = (ZERO, NONE) if contacts == 1 else (ZERO,)
+    return [(wrist + base, when) for base in ("", BASE) for wrist in wrists for when in _LOOKED_AT]
 
 
 def _run_batch(
@@ -132,11 +138,12 @@ def _estimate(
     estimator: ContactEstimator, scene: TouchScene, sensed: Sensed, wrench: str
 ) -> dict[str, dict[str, float]]:
     """Let an estimator feel what the sensors said; return its figures while the arm was still and once it had moved."""
-    wrench_ee = np.zeros(6) if wrench == ZERO else None
+    wrench_ee, base = np.zeros(6) if wrench.startswith(ZERO) else None, wrench.endswith(BASE)
     estimator.reset(sensed.q[0], sensed.qd[0])
     found, early = {}, 0.0
-    for tick, (q, qd, torque) in enumerate(zip(sensed.q, sensed.qd, sensed.torque, strict=True), start=1):
-        contact = estimator.step(Measurement(q, qd, wrench_ee, torque=torque))
+    rows = zip(sensed.q, sensed.qd, sensed.torque, sensed.wrench_base, strict=True)
+    for tick, (q, qd, torque, at_base) in enumerate(rows, start=1):
+        contact = estimator.step(Measurement(q, qd, wrench_ee, torque=torque, wrench_base=at_base if base else None))
         if tick == REST_MS:
             early = float(contact.touched)
         for when in (name for name, looked_at in _LOOKED_AT.items() if looked_at == tick):
@@ -172,26 +179,40 @@ def _figures(estimator: ContactEstimator, contact: Contact, scene: TouchScene, q
 
 
 def _limits(surface: Surface, scene: TouchScene, sensed: Sensed, plant: str) -> dict[tuple[str, str], dict[str, float]]:
-    """Return what the true torques with the sensors' noise alone would tell at the same moments, by scenario.
+    """Return what the true torques, and the base's wrench, with the sensors' noise alone would tell, by scenario.
 
     Of two contacts that is whether a single one explains them; once the arm has moved, three postures are known.
     """
-    arm, sensors = surface.arm, FRANKA_SENSORS if plant == "real" else QUIET_SENSORS
-    sigma = math.hypot(sensors.joint_torque_nm, sensors.joint_torque_play_nm)
+    n, sensors = surface.arm.n, REAL_SENSORS if plant == "real" else QUIET_SENSORS
+    of_joint = math.hypot(sensors.joint_torque_nm, sensors.joint_torque_play_nm)
+    sigma = np.repeat([of_joint, sensors.base_force_n, sensors.base_moment_nm], [n, 3, 3])
     rng = scene_rng(scene.motion.seed, 6)
     postures = [sensed.q_true[tick - 1] for tick in (STILL_MS, (STILL_MS + MOVED_MS) // 2, MOVED_MS)]
-    torques = [true_torque(arm, scene, q) + sigma * rng.standard_normal(arm.n) for q in postures]
-    found = {}
-    for when, seen in ((STILL, 1), (MOVED, 3)):
-        told = {"limit_told": float(is_no_single(surface, postures[:seen], torques[:seen], sigma))}
-        found[ZERO, when] = found[NONE, when] = told
-        if len(scene.touches) > 1:
-            continue
-        (touch,), q, torque = scene.touches, postures[seen - 1], torques[seen - 1]
-        origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))
-        point, true_force = touch.in_world(origins, rotations)
-        force = force_at(arm, q, (touch.link, point, rotations[touch.link] @ touch.inwards), torque, sigma)
-        known = belief(surface, postures[:seen], torques[:seen], sigma, TOOL_PRIOR)
-        for wrench, of in ((NONE, known), (ZERO, known.given(~surface.on_tool))):
-            found[wrench, when] = told | limit_metrics(of, force, surface.apart, (touch.link, point), true_force)
+    felt = [true_torque(surface.arm, scene, q) + of_joint * rng.standard_normal(n) for q in postures]
+    noise = sigma[n:] * rng.standard_normal((len(postures), 6))
+    at_base = [true_base_wrench(surface.arm, scene, q) for q in postures] + noise
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for base, count in (("", n), (BASE, n + 6)):
+        seen = [np.concatenate(both)[:count] for both in zip(felt, at_base, strict=True)]
+        for when, many in ((STILL, 1), (MOVED, 3)):
+            limits = _limits_of(surface, scene, postures[:many], seen[:many], sigma[:count])
+            found |= {(wrench + base, when): figures for wrench, figures in limits.items()}
     return found
+
+
+def _limits_of(
+    surface: Surface, scene: TouchScene, postures: list[np.ndarray], felt: list[np.ndarray], sigma: np.ndarray
+) -> dict[str, dict[str, float]]:
+    """Return what is told by so many postures, by what is known of the wrist."""
+    told = {"limit_told": float(is_no_single(surface, postures, felt, sigma))}
+    if len(scene.touches) > 1:
+        return {ZERO: told, NONE: told}
+    (touch,), q, arm = scene.touches, postures[-1], surface.arm
+    origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))
+    point, true_force = touch.in_world(origins, rotations)
+    force = force_at(arm, q, (touch.link, point, rotations[touch.link] @ touch.inwards), felt[-1], sigma)
+    known = belief(surface, postures, felt, sigma, TOOL_PRIOR)
+    return {
+        wrench: told | limit_metrics(of, force, surface.apart, (touch.link, point), true_force)
+        for wrench, of in ((NONE, known), (ZERO, known.given(~surface.on_tool)))
+    }

@@ -1,9 +1,10 @@
-"""What joint torques themselves tell of a contact's place: the posterior over the arm's surface, its noise known.
+"""What sensors themselves tell of a contact's place: the posterior over the arm's surface, their noise known.
 
 An estimator's own errors come from what it must find out beside: masses, noise, when the contact began. Here the true
 torque of the contact is given with the noise of the sensors alone, and the points are closer to each other, so no
-estimator does better than by luck. Written apart from the estimator, with the same assumptions of what force there may
-be (docs/concepts/localisation.md).
+estimator does better than by luck. A sensor under the base tells six more numbers, behind the torques of a posture:
+force and moment about the world's origin. Written apart from the estimator, with the same assumptions of what force
+there may be (docs/concepts/localisation.md).
 """
 
 import math
@@ -27,6 +28,9 @@ _LEVER_M = 0.5  # lever arm by which a torque is taken for a force
 _ABOUT_M = 0.05
 _LOGISTIC = 1.702  # of a logistic distribution that is nearly the normal one
 
+
+Sigma = float | np.ndarray
+"""Standard deviation of noise, one for all numbers or one for each."""
 
 _BESIDE = 0.35  # a contact is beside its point by this part of how far they are apart, standard deviation along an axis
 _FINE = 5  # points of the finer grid, in a row
@@ -144,7 +148,7 @@ class Belief:
 
 
 def belief(
-    surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float, tool_prior: float
+    surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: Sigma, tool_prior: float
 ) -> Belief:
     """Return the posterior over a surface after the torques of some postures; points where the last has them.
 
@@ -153,8 +157,8 @@ def belief(
     Args:
         surface: of the arm.
         q: postures, each (n,), rad.
-        torque: of the contact in each, with the noise of the sensors, (n,), N m.
-        sigma: standard deviation of that noise, N m.
+        torque: of the contact in each, with the noise of the sensors, (n,), N m; or (n + 6,), the base's behind them.
+        sigma: standard deviation of that noise, one number or one each, N m and N.
         tool_prior: probability of the tool beforehand.
     """
     on_tool = surface.on_tool
@@ -170,7 +174,7 @@ def belief(
     return Belief(surface.links, surface.at(q[-1])[0], probability / probability.sum())
 
 
-def is_no_single(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> bool:
+def is_no_single(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: Sigma) -> bool:
     """Tell whether no single force that turns with its link, on any point of the links, explains torques.
 
     What is left of them where they are explained best would be so large by noise in fewer than one of a hundred.
@@ -178,13 +182,12 @@ def is_no_single(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.
     Args:
         surface: of the arm.
         q: postures, each (n,), rad.
-        torque: in each, with the noise of the sensors, (n,), N m.
-        sigma: standard deviation of that noise, N m.
+        torque, sigma: as in `belief`.
     """
     on_links = np.flatnonzero(~surface.on_tool)
     nearest = np.argsort(_left_over(surface, q, torque, sigma)[on_links])[:_NEAREST]
     left = _left_over(surface.refined(on_links[nearest]), q, torque, sigma)
-    free = max(surface.arm.n * len(q) - 3, 1)
+    free = max(sum(map(len, torque)) - 3, 1)
     most = free * (1.0 - 2.0 / (9.0 * free) + _Z_99 * math.sqrt(2.0 / (9.0 * free))) ** 3  # Wilson & Hilferty 1931
     return bool(left.min() > most)
 
@@ -222,36 +225,48 @@ class _Information:
     left: np.ndarray
 
 
-def _information(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> _Information:
+def _information(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: Sigma) -> _Information:
     """Add up over postures what the torques tell; a contact beside its point has a moment about it as well.
 
-    The noise of a posture has the covariance N = σ² I + s² J_ωᵀ J_ω; its inverse is that of Woodbury.
+    Each number over its own noise, that of a posture has the covariance N = I + s² J_ωᵀ J_ω; its inverse is that of
+    Woodbury.
     """
     count, n = len(surface.rows), surface.arm.n
     A, b, log, left = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros(count), np.zeros(count)
     for posture, felt in zip(q, torque, strict=True):
         rotations = link_frames(description_and_tool(surface.arm)[0], posture[None])[1][0, surface.links]
-        J, turns = jacobians(surface.arm, posture, surface.at(posture)[0], surface.links)
-        local = rotations.swapaxes(1, 2) @ J
-        moment = (_BESIDE * surface.apart * np.linalg.norm(felt) / _LEVER_M) ** 2 + 1e-12
-        inner = np.linalg.inv(sigma**2 / moment * np.eye(3) + turns @ turns.swapaxes(1, 2))
-        known_local = (local - (local @ turns.swapaxes(1, 2)) @ inner @ turns) / sigma**2  # times N⁻¹
-        known_felt = (felt - (((turns @ felt)[:, None] @ inner) @ turns)[:, 0]) / sigma**2
+        J, turns = _shown(surface.arm, posture, surface.at(posture)[0], surface.links, len(felt) > n)
+        scale = np.broadcast_to(sigma, felt.shape)
+        local, turns, seen = rotations.swapaxes(1, 2) @ J / scale, turns / scale, felt / scale
+        moment = (_BESIDE * surface.apart * np.linalg.norm(felt[:n]) / _LEVER_M) ** 2 + 1e-12
+        inner = np.linalg.inv(np.eye(3) / moment + turns @ turns.swapaxes(1, 2))
+        known_local = local - (local @ turns.swapaxes(1, 2)) @ inner @ turns  # times N⁻¹
+        known_seen = seen - (((turns @ seen)[:, None] @ inner) @ turns)[:, 0]
         A += known_local @ local.swapaxes(1, 2)
-        b += known_local @ felt
-        left += known_felt @ felt
-        log += 0.5 * np.linalg.slogdet(inner * (sigma**2 / moment))[1] - n * math.log(sigma)
+        b += known_local @ seen
+        left += known_seen @ seen
+        log += 0.5 * np.linalg.slogdet(inner / moment)[1] - np.log(scale).sum()
     return _Information(A, b, log - 0.5 * left, left)
 
 
-def _left_over(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> np.ndarray:
+def _shown(arm: Arm, q: np.ndarray, points: np.ndarray, links: np.ndarray, base: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return what turns a force and a moment at points into what is felt of it, (P, 3, n) each, 6 more with a base."""
+    linear, angular = jacobians(arm, q, points, links)
+    if not base:
+        return linear, angular
+    unit = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    levers = np.cross(np.eye(3), points[:, None]).swapaxes(1, 2)  # f · (e × p) = e · (p × f)
+    return np.concatenate([linear, unit, levers], axis=2), np.concatenate([angular, 0.0 * unit, unit], axis=2)
+
+
+def _left_over(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: Sigma) -> np.ndarray:
     """Return what a force on each point leaves of the torques, its square over the noise's variance, (P,)."""
     of = _information(surface, q, torque, sigma)
     force = np.linalg.solve(of.A + np.eye(3) / _SINGLE_N**2, of.b[..., None])[..., 0]
     return of.left - np.einsum("pi,pi->p", of.b, force)
 
 
-def _evidence(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: float) -> np.ndarray:
+def _evidence(surface: Surface, q: Sequence[np.ndarray], torque: Sequence[np.ndarray], sigma: Sigma) -> np.ndarray:
     """Return the log of the probability of torques if the contact is at each point, up to a constant, (P,)."""
     of, normals = _information(surface, q, torque, sigma), surface.rows[:, 4:]
     S = force_covariance(normals, np.where(surface.on_tool, NORMAL_N, ACROSS_N))
@@ -272,7 +287,7 @@ def force_covariance(normals: np.ndarray, across_n: np.ndarray) -> np.ndarray:
 
 
 def force_at(
-    arm: Arm, q: np.ndarray, touched: tuple[int, np.ndarray, np.ndarray], torque: np.ndarray, sigma: float
+    arm: Arm, q: np.ndarray, touched: tuple[int, np.ndarray, np.ndarray], torque: np.ndarray, sigma: Sigma
 ) -> np.ndarray:
     """Return the likeliest force where the place is known, world, (3,), N.
 
@@ -280,10 +295,9 @@ def force_at(
         arm: built from a description.
         q: (n,), rad.
         touched: link, point, and normal of either sign there, world, (3,) m and (3,).
-        torque: of the contact, (n,), N m.
-        sigma: its standard deviation, N m.
+        torque, sigma: of one posture, as in `belief`.
     """
     link, point, normal = touched
-    (J,), _ = jacobians(arm, q, point[None], np.array([link]))
+    (J,), _ = _shown(arm, q, point[None], np.array([link]), len(torque) > arm.n)
     S = force_covariance(normal[None], np.array([ACROSS_N]))[0]
-    return S @ J @ np.linalg.solve(sigma**2 * np.eye(arm.n) + J.T @ S @ J, torque)
+    return S @ J @ np.linalg.solve(np.diag(np.broadcast_to(sigma, torque.shape) ** 2) + J.T @ S @ J, torque)

@@ -6,7 +6,7 @@ turns with the link, as that of a hand that holds it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,10 +30,14 @@ REST_MS, STILL_MS, MOVED_MS = 600, 1100, 2300
 PATH_M = (0.1, 0.15)
 """How far the tool is moved in contact, uniform."""
 
+REAL_SENSORS = replace(FRANKA_SENSORS, base=True)
+"""A Franka's, and a sensor under its base, which an estimator is told of or not."""
+
 QUIET_SENSORS = SensorConfig(
-    q_rad=0.0, qd_rad_s=0.0, encoder_step_rad=1e-6, joint_torque=True, joint_torque_nm=0.01, joint_torque_bias_nm=0.0
-)
-"""Sensors at the joints that are better than any arm has."""
+    q_rad=0.0, qd_rad_s=0.0, encoder_step_rad=1e-6, joint_torque=True, joint_torque_nm=0.01, joint_torque_bias_nm=0.0,
+    base=True, base_force_n=0.1, base_moment_nm=0.01, base_force_bias_n=0.0, base_moment_bias_nm=0.0,
+)  # fmt: skip
+"""Sensors that are better than any arm has."""
 
 _STIFFNESS = np.full(6, 600.0)  # 1/s²: some 2 kN/m
 _MOVE_MS = 1000  # the target takes this long, and then waits
@@ -98,12 +102,14 @@ class Sensed:
     Attributes:
         q, qd, torque: measured, (T, n), rad, rad/s, N m.
         q_true: (T, n), rad.
+        wrench_base: measured, as of `Measurement`, (T, 6), N and N m.
     """
 
     q: np.ndarray
     qd: np.ndarray
     torque: np.ndarray
     q_true: np.ndarray
+    wrench_base: np.ndarray
 
 
 def sample_touch_scene(arm: Arm, seed: int, contacts: int) -> TouchScene:
@@ -139,7 +145,7 @@ def sense(arm: Arm, scenes: Sequence[TouchScene], real: bool) -> list[Sensed]:
         real: with errors of plant and sensors; otherwise an arm just as its model, with `QUIET_SENSORS`.
     """
     configs = [
-        WorldConfig(scene.motion.plant, FRANKA_SENSORS, fixtures=())
+        WorldConfig(scene.motion.plant, REAL_SENSORS, fixtures=())
         if real
         else WorldConfig(sensors=QUIET_SENSORS, fixtures=())
         for scene in scenes
@@ -150,6 +156,7 @@ def sense(arm: Arm, scenes: Sequence[TouchScene], real: bool) -> list[Sensed]:
     target, nominal = worlds.controllers["target"], arm.nominal()
     target["quat"] = [scene.motion.start.quat for scene in scenes]
     seen, rows = worlds.controllers["measurement"], np.zeros((4, MOVED_MS, len(scenes), arm.n))
+    at_base = np.zeros((MOVED_MS, len(scenes), 6))
     one_tick = np.ones(len(scenes), dtype=np.int64)
     for tick in range(MOVED_MS):
         if tick % _PRESSED_EVERY_MS == 0:
@@ -163,8 +170,9 @@ def sense(arm: Arm, scenes: Sequence[TouchScene], real: bool) -> list[Sensed]:
                 _press(worlds, i, scene, tick)
         worlds.run_some(0, len(scenes), one_tick)  # so short a run is not worth threads
         rows[:, tick] = seen["q"], seen["qd"], seen["torque"], worlds.records["truth"]["q"]
+        at_base[tick] = seen["wrench_base"]
     worlds.close()
-    return [Sensed(*rows[:, :, i]) for i in range(len(scenes))]
+    return [Sensed(*(row[:, i] for row in (*rows, at_base))) for i in range(len(scenes))]
 
 
 def _press(worlds: Worlds, i: int, scene: TouchScene, tick: int) -> None:
@@ -186,3 +194,10 @@ def true_torque(arm: Arm, scene: TouchScene, q: np.ndarray) -> np.ndarray:
         (point_torque(origins, rotations, t.link, *t.in_world(origins, rotations)) for t in scene.touches),
         start=np.zeros(arm.n),
     )
+
+
+def true_base_wrench(arm: Arm, scene: TouchScene, q: np.ndarray) -> np.ndarray:
+    """Return the wrench of the contacts of a scene about the world's origin, (6,), N and N m, at q (n,) rad."""
+    origins, rotations = (frames[0] for frames in link_frames(description_and_tool(arm)[0], q[None]))
+    places = [touch.in_world(origins, rotations) for touch in scene.touches]
+    return sum((np.concatenate([force, np.cross(point, force)]) for point, force in places), start=np.zeros(6))

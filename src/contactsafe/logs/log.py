@@ -25,6 +25,8 @@ class Log:
         torque: joint torque measured behind the gears, gravity included, (T, n), N m; None likewise.
         command: joint torque commanded, gravity included, (T, n), N m; None likewise.
         wrench_ee: wrench of the environment on the end effector, world axes, (T, 6), N and N m; None likewise.
+        wrench_base: wrench of the arm on its base, weight and all, as of `Measurement`, (T, 6), N and N m; None
+            likewise.
 
     Raises:
         InvalidInputError: too few rows, another number of them or of columns, a number that is not finite, a time that
@@ -38,6 +40,7 @@ class Log:
     torque: np.ndarray | None = None
     command: np.ndarray | None = None
     wrench_ee: np.ndarray | None = None
+    wrench_base: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no robot recorded."""
@@ -47,7 +50,7 @@ class Log:
             raise InvalidInputError(f"{self.source}: 'q' has shape {self.q.shape}; give (T, n)")
         n = int(self.q.shape[1])
         for field in fields(self)[1:]:
-            self._check(field.name, {"time": 0, "wrench_ee": 6}.get(field.name, n))
+            self._check(field.name, {"time": 0, "wrench_ee": 6, "wrench_base": 6}.get(field.name, n))
         if self.torque is None and self.command is None:
             raise InvalidInputError(
                 f"{self.source} has neither 'torque' nor 'command'; one of them must say what drives the joints"

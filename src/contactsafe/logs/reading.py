@@ -20,6 +20,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "torque": ("torque", "tau_J", "tau", "effort", "efforts", "joint_torque", "joint_torques", "measured_torque"),
     "command": ("command", "tau_J_d", "tau_d", "tau_cmd", "commanded_torque", "joint_command"),
     "wrench_ee": ("wrench_ee", "wrench"),
+    "wrench_base": ("wrench_base", "base_wrench"),
 }
 """What a log has, and the names by which it is found where none is given."""
 

@@ -113,7 +113,8 @@ def replay(log: Log, arm: Arm, config: ControllerConfig | None = None, wrench: b
         at_tool = np.zeros(6) if wrench else None
         at_tool = log.wrench_ee[k] if log.wrench_ee is not None else at_tool
         torque = None if log.torque is None else log.torque[k]
-        measured = Measurement(log.q[k], qd[k], at_tool, float(log.time[k]), torque)
+        at_base = None if log.wrench_base is None else log.wrench_base[k]
+        measured = Measurement(log.q[k], qd[k], at_tool, float(log.time[k]), torque, at_base)
         contacts.append(estimator.step(measured, None if log.command is None else log.command[k]))
         residual[k] = contacts[-1].torque
         threshold[k] = estimator.record["state"]["detection"]["threshold"]

@@ -27,7 +27,7 @@ from contactsafe.core.stack import stack_vector
 
 _VIEWED = (
     "qpos", "qvel", "xpos", "xmat", "xipos", "site_xpos", "site_xmat", "xanchor", "xaxis", "subtree_com", "cdof_dot",
-    "cvel", "cinert",
+    "cvel", "cinert", "crb", "cdof",
 )  # fmt: skip
 
 handle_dtype = np.dtype(
@@ -165,7 +165,7 @@ def mass_regressor(handle: Record, out: Matrix) -> None:
 
 
 @compiled
-def _inertia_times(cinert: Vector, v: Vector, out: Vector) -> None:
+def inertia_times(cinert: Vector, v: Vector, out: Vector) -> None:
     """Add I v for MuJoCo's packed spatial inertia (xx yy zz xy xz yz, m·r, m) and twist v (angular first)."""
     xx, yy, zz, xy, xz, yz = cinert[0], cinert[1], cinert[2], cinert[3], cinert[4], cinert[5]
     rx, ry, rz, mass = cinert[6], cinert[7], cinert[8], cinert[9]
@@ -190,7 +190,7 @@ def _coriolis_transpose(handle: Record, n: int, CT_qd: Vector) -> None:
     momentum = stack_vector(6)
     momentum[:] = 0.0
     for body in range(handle.nbody - 1, handle.first_body - 1, -1):
-        _inertia_times(cinert[body], cvel[body], momentum)
+        inertia_times(cinert[body], cvel[body], momentum)
         i = body - handle.first_body
         if i < n:
             s = 0.0

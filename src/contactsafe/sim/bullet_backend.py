@@ -129,6 +129,10 @@ class BulletBackend(Unique):
             raise InvalidInputError(
                 f"{len(config.obstacles)} obstacles asked for; the PyBullet engine has none, take the MuJoCo engine"
             )
+        if config.sensors.base:
+            raise InvalidInputError(
+                "a sensor under the base is asked for; the PyBullet engine has none, take the MuJoCo engine"
+            )
         self._config, self._tick_s, self._n = config, tick_s, arm.n
         self._tcp, self._gravity = np.array(tool.tcp), arm.model.opt.gravity.tolist()
         self._description = perturbed(description, config.plant)

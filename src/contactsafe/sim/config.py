@@ -81,6 +81,11 @@ class SensorConfig:
         joint_torque_nm: its noise, each joint.
         joint_torque_bias_nm: constant of an episode, standard deviation.
         joint_torque_play_nm: half the width of its hysteresis: it follows the torque only so far behind.
+        base: whether there is a force/torque sensor under the base (`Measurement.wrench_base`); MuJoCo alone has one.
+        base_force_n: its noise, each axis. Like that of the moment about that of a sensor that carries an arm's weight.
+        base_moment_nm: its noise, each axis.
+        base_force_bias_n: constant of an episode, standard deviation.
+        base_moment_bias_nm: constant of an episode, standard deviation.
     """
 
     q_rad: float = 1e-5
@@ -99,9 +104,17 @@ class SensorConfig:
     joint_torque_nm: float = 0.0
     joint_torque_bias_nm: float = 0.0
     joint_torque_play_nm: float = 0.0
+    base: bool = False
+    base_force_n: float = 0.5
+    base_moment_nm: float = 0.05
+    base_force_bias_n: float = 2.0
+    base_moment_bias_nm: float = 0.5
 
 
-NO_NOISE = SensorConfig(0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_NOISE = SensorConfig(
+    0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    base_force_n=0.0, base_moment_nm=0.0, base_force_bias_n=0.0, base_moment_bias_nm=0.0,
+)  # fmt: skip
 
 REAL_SENSORS = SensorConfig(q_rad=0.0, encoder_step_rad=2 * math.pi / 2**19, velocity_filter_hz=100.0)
 """Encoders of 19 bit, velocity from their difference, low-passed; torque and wrist sensor as by default."""

@@ -26,6 +26,10 @@ def read(world: Record) -> None:
         truth.wrist_force[k] = data[plant.adr_wrist_force + k]
         truth.wrist_torque[k] = data[plant.adr_wrist_torque + k]
         truth.wrist_acceleration[k] = data[plant.adr_wrist_accelerometer + k]
+    if plant.adr_base_force >= 0:
+        for k in range(3):  # MuJoCo has what the base exerts on the arm, and a push as joint torques, which do not show
+            truth.base_wrench[k] = world.pushed_wrench[k] - data[plant.adr_base_force + k]
+            truth.base_wrench[3 + k] = world.pushed_wrench[3 + k] - data[plant.adr_base_torque + k]
     truth.tau_contact[:] = view1(plant.qfrc_constraint, n)
     _read_fixtures(plant, truth, data)
     xpos = view2(plant.xpos, plant.nbody, 3)
@@ -65,9 +69,9 @@ def write(world: Record) -> None:
 
 @compiled
 def _push(world):
-    """Fill the joint torque of the push in force at this tick."""
-    tau, fraction = world.pushed, world.push.fraction
-    tau[:] = 0.0
+    """Fill the joint torque of the push in force at this tick, and its wrench."""
+    tau, fraction, wrench = world.pushed, world.push.fraction, world.pushed_wrench
+    tau[:], wrench[:] = 0.0, 0.0
     if fraction == 0.0:
         return
     plant, push = world.plant, world.push
@@ -78,6 +82,8 @@ def _push(world):
     for i in range(tau.shape[0]):
         for k in range(3):
             tau[i] += J[k, i] * push.force[k] * fraction
+    wrench[:3] = fraction * push.force
+    wrench[3:] = cross(point, wrench[:3])
 
 
 @compiled

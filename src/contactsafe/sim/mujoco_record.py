@@ -19,12 +19,13 @@ VIEWED = (
 """Arrays of MjData that compiled code reads or writes."""
 
 _COUNTS = ("nq", "nv", "nbody", "ngeom", "nsensordata")
+_BASE = ("base_force", "base_torque")
 _WRIST = ("wrist_force", "wrist_torque", "wrist_accelerometer")
 
 mujoco_dtype = np.dtype(
     [(name, np.uintp) for name in ("model", "data", *VIEWED, "qpos_spring")]
     + [(name, _i) for name in (*_COUNTS, "tcp_site", "n_fixtures", "n_obstacles")]
-    + [(f"adr_{name}", _i) for name in _WRIST]
+    + [(f"adr_{name}", _i) for name in (*_WRIST, *_BASE)]  # −1 without a sensor under the base
     + [
         ("adr_tip", _i, (MAX_FIXTURES,)),  # tip on each fixture; −1 without a tip
         ("adr_arm", _i, (MAX_FIXTURES,)),  # any part of the arm on each fixture
@@ -56,6 +57,8 @@ def fill_plant(plant: Record, model: mujoco.MjModel, config: WorldConfig) -> Non
     addresses = {model.sensor(i).name: model.sensor_adr[i] for i in range(model.nsensor)}
     for name in _WRIST:
         plant[f"adr_{name}"] = addresses[name]
+    for name in _BASE:
+        plant[f"adr_{name}"] = addresses.get(name, -1)
     plant["n_fixtures"], plant["n_obstacles"] = len(config.fixtures), len(config.obstacles)
     for index in range(len(config.fixtures)):
         plant["adr_tip"][index] = addresses.get(f"tip_fixture{index}", -1)

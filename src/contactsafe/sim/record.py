@@ -40,6 +40,7 @@ def world_dtype(n: int) -> np.dtype:
             ("motor", _f, (n,)),  # torque of the motors, N m
             ("drag", _f, (n,)),  # friction torque, against the motion, N m
             ("pushed", _f, (n,)),  # torque of the push in force, N m
+            ("pushed_wrench", _f, (6,)),  # the same as a wrench about the world's origin, N and N m
         ]
     )
 
@@ -48,10 +49,12 @@ def world_bounds(bodies: int) -> dict[str, tuple[float, float]]:
     """Return the fields of a world that change, and what they may be; the others are what it was made with."""
     ticks, measure = (-1, 2**53), (-1e9, 1e9)
     sensed = ("joints.band", "joints.torque_bias", "joints.torque_held", "joints.qd_before")
-    changing = ("q_seen", "qd_seen", "tau_delayed", "wrench_bias", "friction", "bristle", *sensed)
+    changing = ("q_seen", "qd_seen", "tau_delayed", "wrench_bias", "base.bias", "friction", "bristle", *sensed)
     return {
         **dict.fromkeys(("tick", "push.start", "push.stop", "push.ramp", "errors.delay_ticks"), ticks),
-        **dict.fromkeys(("push.point", "push.force", "push.fraction", "motor", "drag", "pushed"), measure),
+        **dict.fromkeys(
+            ("push.point", "push.force", "push.fraction", "motor", "drag", "pushed", "pushed_wrench"), measure
+        ),
         **{f"errors.{name}": measure for name in changing},
         **{f"truth.{name}": measure for name in truth_dtype(1).names or ()},
         "plant.obstacle_stopped": (0, 1),

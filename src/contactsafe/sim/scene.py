@@ -65,6 +65,8 @@ def scene_mjcf(arm: Arm, config: WorldConfig) -> str:
     for index in range(1, arm.n + 1):
         ET.SubElement(actuator, "motor", name=f"motor{index}", joint=f"joint{index}")
     _sensors(root, tool, config)
+    if config.sensors.base:
+        _base_sensor(root)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode")
 
@@ -161,3 +163,11 @@ def _sensors(root: ET.Element, tool: Tool, config: WorldConfig) -> None:
             sensor, "contact", name=f"arm_obstacle{index}", geom1=f"obstacle{index}", subtree2="link1",
             reduce="netforce", data="found force",
         )  # fmt: skip
+
+
+def _base_sensor(root: ET.Element) -> None:
+    """Put a sensor under the base, its axes those of the world."""
+    base = next(body for body in root.iter("body") if body.get("name") == "link0")
+    ET.SubElement(base, "site", name="base")
+    for name, kind in (("base_force", "force"), ("base_torque", "torque")):
+        ET.SubElement(root.find("sensor"), kind, name=name, site="base")  # type: ignore[arg-type]

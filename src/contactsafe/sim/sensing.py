@@ -17,6 +17,7 @@ from contactsafe.core.linalg import cross_into, matvec_into
 from contactsafe.core.stack import stack_vector
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.friction import joint_drag_into
+from contactsafe.sim.base_sensor import CHANNELS, base_sensor_dtype, fill_base_sensor, sense_base
 from contactsafe.sim.config import SensorConfig, WorldConfig, per_joint
 from contactsafe.sim.joint_sensors import band_gain, joint_sensors_dtype, sense_torque, velocity_noise
 from contactsafe.sim.stiction import add_stiction
@@ -28,10 +29,12 @@ _i = np.int64
 def noise_channels(n: int, sensors: SensorConfig | None = None) -> int:
     """Count the random numbers one tick needs: q, q̇ and torque of n joints, force, moment, accelerometer.
 
-    Sensors at the joints need 2 n more, which come last: of torque, and of velocity in its band.
+    Sensors at the joints need 2 n more, which come next: of torque, and of velocity in its band. One under the base
+    needs its own, which come last.
     """
     more = sensors is not None and (sensors.joint_torque or sensors.velocity_band_rad_s > 0.0)
-    return 3 * n + 9 + (2 * n if more else 0)
+    base = sensors is not None and sensors.base
+    return 3 * n + 9 + (2 * n if more else 0) + (CHANNELS if base else 0)
 
 
 @functools.cache
@@ -57,6 +60,7 @@ def errors_dtype(n: int) -> np.dtype:
             ("stiction", _f, (n,)),  # dry friction, N m
             ("bristle", _f, (n,)),  # how far it is taken up, −1 … 1
             ("joints", joint_sensors_dtype(n)),
+            ("base", base_sensor_dtype),
             ("delay_ticks", _i),  # 0 or 1, between a command and its effect
             ("q_seen", _f, (n,)),  # last measured positions, rad
             ("qd_seen", _f, (n,)),  # last measured velocities, rad/s
@@ -90,6 +94,7 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     joints["has_torque"], joints["torque_sigma"] = sensors.joint_torque, sensors.joint_torque_nm
     joints["play"], joints["rotor"] = sensors.joint_torque_play_nm, arm.model.dof_armature
     joints["friction"], joints["drag"] = arm.sensor_friction, arm.sensor_drag
+    fill_base_sensor(errors["base"], sensors, noise_channels(arm.n, sensors) - CHANNELS)
     errors["delay_ticks"] = config.plant.torque_delay_ticks
 
 
@@ -135,6 +140,8 @@ def sense(world: Record, controller: Record, noise: Vector) -> None:
         _sense_wrench(errors, truth, controller.dynamics.rotation, measurement, noise[3 * n :])
     if errors.joints.has_torque != 0:
         sense_torque(world, measurement, noise[3 * n + 9 :], controller.params.clock.dt)
+    if errors.base.present != 0:
+        sense_base(errors.base, truth.base_wrench, measurement, noise)
 
 
 @compiled

@@ -112,6 +112,7 @@ def _record(world, controller, row):
     row.K_task[:] = controller.state.impedance.K_task
     row.D_task[:] = controller.state.impedance.D_task
     row.wrench_ee[:] = controller.measurement.wrench_ee
+    row.wrench_base[:] = controller.measurement.wrench_base
     row.residual[:] = out.residual
     row.residual_fast[:] = out.residual_fast
     row.mode, row.link = out.mode, out.link

@@ -22,6 +22,7 @@ def truth_dtype(n: int) -> np.dtype:
             ("wrist_force", _f, (3,)),  # that the arm exerts on the tool, flange axes, N
             ("wrist_torque", _f, (3,)),  # likewise, about the flange, N m
             ("wrist_acceleration", _f, (3,)),  # of the tool's centre of mass, less gravity, flange axes, m/s²
+            ("base_wrench", _f, (6,)),  # of the arm on its base, about the world's origin, world axes; 0 with no sensor
             ("tip_wrench", _f, (6,)),  # of the fixtures on the tool's tip, about the tool point, world axes, N, N m
             ("tip_contacts", _f),  # of the tip with fixtures
             ("arm_contacts", _f),  # of any moving part of the arm with fixtures, the tip included
@@ -68,6 +69,7 @@ def trace_dtype(n: int) -> np.dtype:
             ("D_task", _f, (6,)),  # in force, 1/s
             ("tool_force", _f, (3,)),  # fixtures on tip, world axes, N
             ("wrench_ee", _f, (6,)),  # as measured
+            ("wrench_base", _f, (6,)),  # likewise
             ("obstacle_force", _f),  # largest |force| of one obstacle on the arm, N
             ("obstacle_position", _f, (MAX_OBSTACLES, 3)),  # m
             ("tau_arm", _f, (n,)),  # true external torque less the tip's, N m

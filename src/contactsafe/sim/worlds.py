@@ -19,6 +19,7 @@ from contactsafe.core.state import Entry, load_state_dict, of_generators, of_rec
 from contactsafe.robot.arm import Arm, finite_array, require_arm
 from contactsafe.sim import model_changes, mujoco_backend
 from contactsafe.sim.backend import Backend, StepArrays, run_backend
+from contactsafe.sim.base_sensor import sample_base_bias
 from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.mujoco_record import fill_plant, point_plant
 from contactsafe.sim.record import world_bounds, world_dtype
@@ -175,8 +176,10 @@ class Worlds(Independent):
         errors["wrench_bias"][3:] = sensors.moment_bias_nm * self.rngs[i].standard_normal(3)
         if sensors.joint_torque:
             errors["joints"]["torque_bias"] = sensors.joint_torque_bias_nm * self.rngs[i].standard_normal(self.arm.n)
+        sample_base_bias(errors["base"], sensors, self.rngs[i])
         errors["bristle"], errors["joints"]["band"], errors["joints"]["qd_before"] = 0.0, 0.0, 0.0
         errors["joints"]["torque_held"], record["motor"], record["drag"] = gravity, gravity, 0.0
+        record["pushed_wrench"] = 0.0
         if self.backends:
             self.backends[i].reset(q)
             self.backends[i].read(record)
