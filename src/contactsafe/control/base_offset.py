@@ -59,7 +59,9 @@ def follow_base_change(base: Record, handle: Record, state: Record, params: Reco
 @compiled
 def _learn(base: Record, regressor: Matrix, dt: float) -> None:
     base.seconds += dt
-    gain = max(filter_gain(_MEMORY_1_S, dt), dt / base.seconds)
+    if base.seconds <= 0.0:
+        return
+    gain = min(max(filter_gain(_MEMORY_1_S, dt), dt / base.seconds), 1.0)
     for k in range(6):
         news = base.residual[k] - base.offset[k]
         base.offset[k] += gain * news

@@ -19,6 +19,9 @@ from contactsafe.robot.base_dynamics import arm_momentum_into, arm_weight_into
 _f = np.float64
 _i = np.int64
 
+_SETTLE_S = 0.1
+"""Of an arm that is not at rest the filters begin with what accelerates it; so long nothing is learned."""
+
 
 def base_wrench_dtype(n: int) -> np.dtype:
     """Describe what is remembered of the wrench at the base."""
@@ -36,7 +39,7 @@ def base_wrench_dtype(n: int) -> np.dtype:
             ("offset", _f, (6,)),  # of the residual while nothing touches, N and N m
             ("variance", _f, (6,)),  # of the residual about it, N² and N² m²
             ("regressor", _f, (3, n + 1)),  # of `weight_moment_regressor`, where the offset was learned, N m
-            ("seconds", _f),  # for which it was learned
+            ("seconds", _f),  # for which it was learned; less than 0 until the filters have settled
             ("wrench", _f, (6,)),  # external, about the world's origin, world axes, N and N m
             ("sigma", _f, (6,)),  # its standard deviation
         ]
@@ -70,7 +73,7 @@ def observe_base(base: Record, handle: Record, state: Record, dynamics: Record, 
         base.unfiltered[:], base.residual[:], base.variance[:] = balance, balance, 0.0
         base.rate_unfiltered[:], base.rate[:] = 0.0, 0.0
         base.impulse_before[:] = balance * state.clock.since
-        base.started = 1
+        base.started, base.seconds = 1, -_SETTLE_S
     else:
         _follow(base, state, momentum, balance, params.clock.dt)
     base.momentum[:], base.balance[:] = momentum, balance
