@@ -250,3 +250,13 @@ def test_what_has_passed_between_two_measurements_is_the_mean_of_it():
         found.append(scene.found["wrench"].copy())
     for one, other in pairwise(found):
         assert_allclose(one, other, atol=0.3)
+
+
+def test_a_contact_that_the_joints_do_not_feel_is_not_taken_for_the_offset():
+    """A light push along the first axis, upwards through the base: the joints hold it unnoticed for a while."""
+    scene = Scene()
+    scene.run(700)
+    scene.pushed, scene.force = "link2", np.array([0.0, 0.0, 12.0])
+    contact = scene.run(600)
+    assert not contact.touched
+    assert scene.found["wrench"][2] > 10.0

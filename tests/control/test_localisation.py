@@ -257,3 +257,44 @@ def test_a_sweep_compares_all_points_by_the_same_torque(panda):
 def _part(places, handles, torque, sigma, q):
     known, base = Uncertainty(sigma, evidence.moment_variance(torque)), places[0].base
     localisation.localise(places[0], handles[0], torque, known, base, q, 1.0, 0.02, 0.001)
+
+
+def base_of(here, index, force, sigma_n=0.5, sigma_nm=0.1):
+    """Give what a sensor under the base tells of a force on a place."""
+    base = np.zeros(1, wrench_information.told_base_dtype)
+    base["told"], base["wrench"] = 1, np.concatenate([force, np.cross(here.point(index)[1], force)])
+    base["sigma"] = [sigma_n] * 3 + [sigma_nm] * 3
+    return base
+
+
+def set_of(panda, place):
+    log = place["log"][: len(panda.places)]
+    probability = np.sort(np.exp(log - log.max()))[::-1]
+    return int(np.searchsorted(np.cumsum(probability / probability.sum()), 0.95)) + 1
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_wrench_at_the_base_makes_the_set_smaller_and_point_and_force_right(panda, seed):
+    here, rng = bench(panda, seed)
+    index = int(rng.integers(0, 480))
+    point, normal = here.point(index)[1:]
+    force = -25.0 * normal + 4.0 * np.cross(normal, [0.6, 0.0, 0.8])
+    torque = here.torque(index, force)
+    without, told = here.localised(torque, 0.2), here.localised(torque, 0.2, bases=base_of(here, index, force))
+    assert set_of(panda, told) < set_of(panda, without)
+    assert np.linalg.norm(told["force"] - force) < 1.0
+    line = np.linalg.norm(np.cross(told["point"] - point, force)) / np.linalg.norm(force)
+    assert line < 0.025
+    assert np.linalg.norm(told["point"] - point) < np.linalg.norm(without["point"] - point) + 0.03
+    assert told["left_over"] < 1.0
+
+
+def test_a_wrench_that_no_single_force_has_is_told(panda):
+    """The torques of one force, and at the base a couple beside it: as of two contacts that the joints take for one."""
+    here = Bench(panda, panda.home)
+    index = next(k for k in range(480) if here.point(k)[0] == 5)
+    force = -25.0 * here.point(index)[2]
+    base = base_of(here, index, force)
+    assert here.localised(here.torque(index, force), 0.2, bases=base)["left_over"] < 1.0
+    base["wrench"][0, 3:] += 8.0 * here.point(index)[2]
+    assert here.localised(here.torque(index, force), 0.2, bases=base)["left_over"] > 1.0

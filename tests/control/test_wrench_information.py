@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from contactsafe import robots
 from contactsafe.control import wrench_information
-from contactsafe.control.wrench_information import information_dtype
+from contactsafe.control.wrench_information import information_dtype, told_base_dtype
 from contactsafe.core.compiled import compiled
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 
@@ -17,6 +17,11 @@ from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 @compiled
 def _inform(told, handles, torque, sigma):
     wrench_information.inform(told[0], handles[0], torque, sigma)
+
+
+@compiled
+def _inform_of_base(told, handles, bases):
+    wrench_information.inform_of_base(told[0], handles[0], bases[0])
 
 
 @compiled
@@ -108,3 +113,48 @@ def test_less_noise_tells_more(panda):
     torque = one.rng.normal(0.0, 5.0, 7)
     quiet, noisy = one.told(torque, np.full(7, 0.1)), one.told(torque, np.full(7, 0.2))
     assert_allclose(quiet["G"], 4.0 * noisy["G"], rtol=1e-12)
+
+
+def at_base(wrench, sigma):
+    base = np.zeros(1, told_base_dtype)
+    base["told"], base["wrench"], base["sigma"] = 1, wrench, sigma
+    return base
+
+
+def wrench_at_base(one, link):
+    """Give what turns a wrench in the link's frame into that about the world's origin, (6, 6) transposed."""
+    body = one.arm.model.jnt_bodyid[link - 1]
+    R, origin = one.data.xmat[body].reshape(3, 3), one.data.xpos[body]
+    cross = np.array([[0.0, -origin[2], origin[1]], [origin[2], 0.0, -origin[0]], [-origin[1], origin[0], 0.0]])
+    return np.block([[R, np.zeros((3, 3))], [cross @ R, R]]).T
+
+
+@given(st.integers(0, 10_000), st.integers(1, 7))
+def test_a_sensor_under_the_base_adds_the_information_of_six_numbers_more(panda, seed, link):
+    one = Posed(panda, seed)
+    torque, wrench = one.rng.normal(0.0, 5.0, 7), one.rng.normal(0.0, 10.0, 6)
+    told, sigma = one.told(torque, np.full(7, 0.2)), one.rng.uniform(0.05, 2.0, 6)
+    G, h = told["G"][0, link - 1].copy(), told["h"][0, link - 1].copy()
+    _inform_of_base(told, one.handles, at_base(wrench, sigma))
+    W = wrench_at_base(one, link)
+    assert_allclose(told["G"][0, link - 1], G + W / sigma**2 @ W.T, rtol=1e-9, atol=1e-9)
+    assert_allclose(told["h"][0, link - 1], h + W / sigma**2 @ wrench, rtol=1e-9, atol=1e-9)
+
+
+def test_one_that_is_not_told_adds_nothing(panda):
+    one = Posed(panda, 1)
+    told = one.told(one.rng.normal(0.0, 5.0, 7), np.full(7, 0.2))
+    before, base = told.copy(), at_base(np.full(6, 3.0), np.ones(6))
+    base["told"] = 0
+    _inform_of_base(told, one.handles, base)
+    assert (told == before).all()
+
+
+@given(st.integers(0, 10_000), st.integers(1, 7))
+def test_it_alone_tells_the_whole_wrench_on_any_link(panda, seed, link):
+    """Joint torques never do on the first ones: what bends them shows at the base alone."""
+    one = Posed(panda, seed)
+    on_link = one.rng.normal(0.0, [10.0, 10.0, 10.0, 1.0, 1.0, 1.0])
+    told = np.zeros(1, information_dtype(7))
+    _inform_of_base(told, one.handles, at_base(wrench_at_base(one, link).T @ on_link, np.ones(6)))
+    assert_allclose(np.linalg.solve(told["G"][0, link - 1], told["h"][0, link - 1]), on_link, rtol=1e-6, atol=1e-6)

@@ -32,6 +32,7 @@ from contactsafe.experiments.touch_scenes import (
     STILL_MS,
     sample_touch_scene,
     sense,
+    true_base_wrench,
     true_torque,
 )
 from contactsafe.robot import robots
@@ -97,10 +98,20 @@ def test_the_arm_moves_after_it_was_still_and_sensors_agree_with_the_truth(touch
         assert np.abs(sensed.q_true[-1] - sensed.q_true[STILL_MS]).max() > 0.05
 
 
+def test_the_sensor_under_the_base_feels_the_contact_as_its_wrench(touched):
+    """What it changes by when the contact begins is the contact's; the arm has hardly moved."""
+    for scene, sensed in zip(*touched, strict=True):
+        after, before = (sensed.wrench_base[tick - 50 : tick].mean(axis=0) for tick in (STILL_MS, REST_MS))
+        true = true_base_wrench(ARM, scene, sensed.q_true[STILL_MS])
+        assert_allclose((after - before)[:3], true[:3], atol=0.2)
+        assert_allclose((after - before)[3:], true[3:], atol=1.0)
+
+
 def test_a_scene_is_sensed_alike_alone_and_among_others(touched):
     scenes, sensed = touched
     (alone,) = sense(ARM, scenes[1:], real=False)
     assert_allclose(alone.torque, sensed[1].torque, atol=1e-9)
+    assert_allclose(alone.wrench_base, sensed[1].wrench_base, atol=1e-6)
 
 
 @given(seeds, st.integers(1, ARM.n))
@@ -177,6 +188,30 @@ def test_sets_hold_the_truth_as_often_as_they_claim_and_shrink_as_the_arm_moves(
     assert places[1] < 0.6 * places[0]
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_wrench_at_the_base_narrows_what_is_believed(seed):
+    touch, q, torque, (origins, rotations) = of_one(seed)
+    scene = sample_touch_scene(ARM, seed, 1)
+    felt, sigma = np.concatenate([torque, true_base_wrench(ARM, scene, q)]), np.repeat([0.1, 0.5, 0.05], [7, 3, 3])
+    without, told = belief(SURFACE, [q], [torque], 0.1, 0.0), belief(SURFACE, [q], [felt], sigma, 0.0)
+    assert len(told.likeliest(0.95)) < len(without.likeliest(0.95))
+    point, force = touch.in_world(origins, rotations)
+    found = force_at(ARM, q, (touch.link, point, rotations[touch.link] @ touch.inwards), felt, sigma)
+    assert_allclose(found, force, atol=1.0)
+    assert not is_no_single(SURFACE, [q], [felt], sigma)
+
+
+def test_opposed_contacts_are_told_more_often_with_it():
+    told, sigma = np.zeros(2), np.repeat([0.1, 0.5, 0.05], [7, 3, 3])
+    for seed in range(8):
+        scene = sample_touch_scene(ARM, seed, 2)
+        q = scene.motion.q_start
+        torque = true_torque(ARM, scene, q)
+        felt = np.concatenate([torque, true_base_wrench(ARM, scene, q)])
+        told += is_no_single(SURFACE, [q], [torque], 0.1), is_no_single(SURFACE, [q], [felt], sigma)
+    assert told[1] > told[0]
+
+
 def test_a_wrench_of_zero_rules_the_tool_out():
     _, q, torque, _ = of_one(0)
     both, arm_alone = (belief(SURFACE, [q], [torque], 0.2, prior) for prior in (0.4, 0.0))
@@ -249,11 +284,12 @@ def test_a_force_is_right_within_the_larger_of_15_percent_and_2_n(force, within,
 def test_the_experiment_counts_its_trials_and_shows_the_limit():
     config, done = ExperimentConfig(("vices", "safe"), trials=2, plants=("real",)), []
     result = localisation(config, done.append)
-    assert sum(done) == len(result.trials) == ENTRIES["localisation"].count(config) == 12
+    assert sum(done) == len(result.trials) == ENTRIES["localisation"].count(config) == 24
     assert {trial.controller for trial in result.trials} == {"safe"}
     one = [trial.metrics for trial in result.trials if not trial.scenario.startswith(TWO)]
     two = [trial.metrics for trial in result.trials if trial.scenario.startswith(TWO)]
-    assert (len(one), len(two)) == (8, 4)
+    assert (len(one), len(two)) == (16, 8)
+    assert sum("base sensor" in trial.scenario for trial in result.trials) == 12
     assert all("limit_in_set" in metrics for metrics in one)
     assert all("within_5_cm" not in metrics and "limit_told" in metrics for metrics in two)
     shown = {key for metrics in one + two for key in metrics if not key.startswith("limit_")}

@@ -47,6 +47,21 @@ def log_of(rows):
     return Log("a log", rows["time"], rows["q"], rows["qd"], rows["torque"])
 
 
+def test_a_wrench_at_the_base_is_played_too_and_tells_the_force_better(arm):
+    rows = recorded(arm)
+    weight, pushed = -9.81 * arm.model.body_subtreemass[1], (rows["time"] >= 1.0) & (rows["time"] < 1.5)
+    data = mujoco.MjData(arm.model)
+    data.qpos[:] = arm.home
+    mujoco.mj_forward(arm.model, data)
+    at, com = data.body("link5").xipos, data.subtree_com[1]
+    held = np.concatenate([[0.0, 0.0, weight], np.cross(com, [0.0, 0.0, weight])])
+    at_base = held + pushed[:, None] * np.concatenate([PUSH_N, np.cross(at, PUSH_N)])
+    log = Log("a log", rows["time"], rows["q"], rows["qd"], rows["torque"], wrench_base=at_base)
+    told, untold = (replay(one, arm).touches[0] for one in (log, log_of(rows)))
+    assert np.linalg.norm(told.force - PUSH_N) < np.linalg.norm(untold.force - PUSH_N) + 0.5
+    assert told.force @ PUSH_N / 25.0 == pytest.approx(25.0, rel=0.1)
+
+
 @pytest.mark.parametrize("rate_hz", [1000, 200, 100])
 def test_a_push_is_found_with_its_time_its_link_and_its_force(arm, rate_hz):
     played = replay(log_of(recorded(arm, rate_hz=rate_hz)), arm)

@@ -16,6 +16,9 @@ from contactsafe.robot.base_dynamics import weight_moment_regressor
 _MEMORY_1_S, _LEARNED_S = 0.5, 0.25
 """Of the offset, as of the joints' baseline; before that nothing is told."""
 
+_SHOWS, _DOUBTED_1_S = 4.0, 0.1
+"""What exceeds so many standard deviations may be a contact that the joints do not feel: it is learned within 10 s."""
+
 _LEAST_N, _LEAST_NM, _SCALE = 0.2, 0.1, 0.01
 """Standard deviations beside the scatter that was seen: of force, of moment, and as a fraction of either."""
 
@@ -62,6 +65,8 @@ def _learn(base: Record, regressor: Matrix, dt: float) -> None:
     if base.seconds <= 0.0:
         return
     gain = min(max(filter_gain(_MEMORY_1_S, dt), dt / base.seconds), 1.0)
+    if base.told != 0 and _shows(base):
+        gain = filter_gain(_DOUBTED_1_S, dt)
     for k in range(6):
         news = base.residual[k] - base.offset[k]
         base.offset[k] += gain * news
@@ -69,6 +74,14 @@ def _learn(base: Record, regressor: Matrix, dt: float) -> None:
     for k in range(3):
         for link in range(regressor.shape[1]):
             base.regressor[k, link] += gain * (regressor[k, link] - base.regressor[k, link])
+
+
+@compiled
+def _shows(base: Record) -> bool:
+    for k in range(6):
+        if abs(base.wrench[k]) > _SHOWS * base.sigma[k]:
+            return True
+    return False
 
 
 @compiled

@@ -40,8 +40,7 @@ _STUCK_RAD = 2e-5
 def is_usable(m: Record, arm: Record, braking: int) -> bool:
     """Tell whether every number of a measurement is one that this arm can have.
 
-    A broken sensor of force or torque stops the arm, but it is braked by its joints, which are still seen. One under
-    the base does not: no law needs it.
+    A broken sensor of force or torque stops the arm, which its joints still brake; one under the base does not.
 
     Args:
         m: `measurement_dtype` record.
