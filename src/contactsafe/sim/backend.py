@@ -19,7 +19,7 @@ class Backend(Protocol):
         """Put the arm at rest at q (n,) rad, its motors carrying its nominal weight; all else is as it was built."""
 
     def read(self, world: np.void) -> None:
-        """Fill `truth` of a `world_dtype` record, all of it."""
+        """Fill `truth` of a `world_dtype` record, all of it; `base_wrench` where the world has a sensor for it."""
 
     def write(self, world: np.void) -> None:
         """Take the torques for the next tick: `motor` less `drag`, N m, and the `push`; fill `pushed`."""
