@@ -284,7 +284,7 @@ def test_missing_and_broken_files_are_refused(tmp_path):
     with pytest.raises(InvalidInputError) as caught:
         robots.from_mjcf(Path("nowhere.xml"), site="tip")
     assert str(caught.value) == (
-        "no file at 'nowhere.xml'; give the path of an MJCF file, or a compiled mujoco.MjModel"
+        "no file at 'nowhere.xml'; give the path of an MJCF file, a mujoco.MjSpec, or a compiled mujoco.MjModel"
     )
     with pytest.raises(InvalidInputError, match=r"^no file at '<mujoco>.{1,80}'; give the path"):
         robots.from_mjcf("<mujoco>" + 500 * "<worldbody/>" + "</mujoco>", site="tip")
@@ -301,7 +301,8 @@ def test_missing_and_broken_files_are_refused(tmp_path):
         (
             [MOTOR_A, '<position joint="a" kp="10"/>'],
             "actuator 0 (without a name) of joint 'a' is no motor, which turns its control into torque and nothing "
-            """else; replace it by <motor joint="a"/>""",
+            """else; replace it by <motor joint="a"/>, or edit the scene's MjSpec with """
+            "robots.make_torque_driven(spec, 'tip')",
         ),
         (
             ["<worldbody>", '<option timestep="0.0007"/><worldbody>'],

@@ -7,7 +7,7 @@ import mujoco
 from contactsafe.core.errors import InvalidInputError
 
 JOINT, SITE, ACTUATOR = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_ACTUATOR
-SENSOR = mujoco.mjtObj.mjOBJ_SENSOR
+SENSOR, BODY = mujoco.mjtObj.mjOBJ_SENSOR, mujoco.mjtObj.mjOBJ_BODY
 _LISTED = 12  # names that a message lists
 
 
@@ -20,7 +20,9 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
     found = mujoco.mj_name2id(model, kind, str(name))
     if found < 0:
         word = kind.name.removeprefix("mjOBJ_").lower()
-        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.nactuator, SENSOR: model.nsensor}[kind]
+        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.actuator_trntype.size, SENSOR: model.nsensor}[
+            kind
+        ]
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
         raise InvalidInputError(f"{word} '{name}' is not in the model; give one of: {listed(filter(None, names))}")
     return found

@@ -1,0 +1,195 @@
+"""A downloaded model made fit for the controller: motors in place of servos, a site at the flange, the timestep."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.robot.binding import actuators_of
+from contactsafe.robot.bodies import link_of
+from contactsafe.robot.findings import Findings
+from contactsafe.robot.names import BODY, JOINT, SITE, find
+from contactsafe.robot.user_chain import choose_chain, is_led, refuse_tied
+from contactsafe.robot.user_limits import torque_limits
+
+_LIMITED = int(mujoco.mjtLimited.mjLIMITED_TRUE)
+
+
+class Flange(NamedTuple):
+    """An end-effector point in a model that has no site there.
+
+    Attributes:
+        body: that carries it.
+        position: in that body's frame, m.
+        quat: of the tool's axes in that body's frame, w x y z.
+        name: of the site that is made.
+    """
+
+    body: str
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    name: str = "flange"
+
+
+def make_torque_driven(
+    spec: mujoco.MjSpec,
+    site: str | Flange,
+    joints: Sequence[str] | None = None,
+    *,
+    tau_max: ArrayLike | None = None,
+    timestep: float = 0.001,
+) -> str:
+    """Edit a scene in place so that the controller can drive an arm in it; compile it afterwards.
+
+    Each of the arm's joints gets one motor in place of its position or velocity servos, with their force limit; gear,
+    rotor inertia and friction stay. The arm carries its own weight no more (gravcomp), follows no mocap body, and what
+    key frames say of its controls is 0. The timestep becomes the tick's, unless it divides it. Joints without a name
+    get one. For two arms in one scene call it for each.
+
+    Args:
+        spec: of the scene.
+        site: end-effector point by its name, or a `Flange` to make one.
+        joints: names of the arm's hinges from base to tip; None for all that move the site.
+        tau_max: torque limits, (n,), N m; None for the model's own. The smaller holds.
+        timestep: of the model, s.
+
+    Returns:
+        The site's name.
+
+    Raises:
+        InvalidInputError: a name is unknown, a joint is no hinge, has no torque limit, or an equality constraint ties
+            the arm.
+    """
+    if not isinstance(spec, mujoco.MjSpec):
+        raise InvalidInputError(f"spec is {type(spec).__name__}; give the mujoco.MjSpec of the scene")
+    _name_all(spec)
+    name, findings = add_flange(spec, site), Findings()
+    model = compiled_spec(spec, "the MjSpec")
+    chain = choose_chain(model, find(model, SITE, name), joints, findings, several=True)
+    limits = torque_limits(model, chain, tau_max, findings)
+    _follow_nothing(spec, model, chain)
+    findings.raise_problems()
+    keys = _controls_of_keys(spec, model, chain)
+    for joint, limit in zip(chain, limits, strict=True):
+        _give_motor(spec, model, joint, float(limit))
+    for key, ctrl, act in keys:
+        key.ctrl, key.act = ctrl, act
+    for body in np.flatnonzero(link_of(model, chain)):
+        spec.body(mujoco.mj_id2name(model, BODY, body)).gravcomp = 0.0
+    steps = round(timestep / model.opt.timestep)
+    if steps < 1 or abs(steps * model.opt.timestep - timestep) > 1e-9:
+        spec.option.timestep = timestep
+    refuse_tied(compiled_spec(spec, "the edited MjSpec"), chain, findings)
+    findings.raise_problems()
+    return name
+
+
+def compiled_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
+    """Compile a scene.
+
+    Raises:
+        InvalidInputError: MuJoCo cannot.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InvalidInputError(f"MuJoCo cannot read {what}: {reason}; mend the file") from None
+
+
+def add_flange(spec: mujoco.MjSpec, site: str | Flange) -> str:
+    """Return a site's name, made first where a `Flange` is given.
+
+    Raises:
+        InvalidInputError: there is no such body.
+    """
+    if not isinstance(site, Flange):
+        return site
+    body = spec.body(site.body)
+    if body is None:
+        names = ", ".join(one.name for one in spec.bodies if one.name)
+        raise InvalidInputError(f"body {shown(site.body)} of the flange is not in the model; give one of: {names}")
+    taken = {one.name for one in spec.sites}
+    name = next(name for name in (site.name, *(f"{site.name}{i}" for i in range(2, 100))) if name not in taken)
+    body.add_site(name=name, pos=site.position, quat=site.quat)
+    return name
+
+
+def _name_all(spec: mujoco.MjSpec) -> None:
+    """Give parts a name where they have none: what is edited is found by its name."""
+    named = {"joint": spec.joints, "body": spec.bodies[1:], "actuator": spec.actuators, "equality": spec.equalities}
+    for kind, things in named.items():
+        taken = {thing.name for thing in things}
+        free = (f"{kind}{i}" for i in range(10**6) if f"{kind}{i}" not in taken)
+        for thing in things:
+            if not thing.name:
+                thing.name = next(free)
+
+
+def _give_motor(spec: mujoco.MjSpec, model: mujoco.MjModel, joint: int, limit: float) -> None:
+    """Let one motor turn a joint, N m, in place of all that did."""
+    name, works = mujoco.mj_id2name(model, JOINT, joint), actuators_of(model, joint)
+    for extra in works[1:]:
+        _remove(spec, spec.actuator(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, extra)))
+    if works:
+        motor = spec.actuator(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, works[0]))
+        gear = abs(float(model.actuator_gear[works[0], 0])) or 1.0
+    else:
+        motor, gear = spec.add_actuator(name=f"{name}_motor", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT), 1.0
+    become_motor(motor, limit / gear)
+
+
+def become_motor(actuator: Any, force: float) -> None:
+    """Make an actuator of an `MjSpec` a motor, force in both directions at its control's unit; inf for no limit."""
+    actuator.gaintype, actuator.gainprm = mujoco.mjtGain.mjGAIN_FIXED, [1.0, *9 * (0.0,)]
+    actuator.biastype, actuator.biasprm = mujoco.mjtBias.mjBIAS_NONE, np.zeros(10)
+    actuator.dyntype, actuator.dynprm = mujoco.mjtDyn.mjDYN_NONE, [1.0, *9 * (0.0,)]
+    actuator.actdim, actuator.actlimited, actuator.actrange = -1, int(mujoco.mjtLimited.mjLIMITED_FALSE), (0.0, 0.0)
+    actuator.inheritrange, actuator.plugin.active = 0.0, False
+    if hasattr(actuator, "set_to_motor"):
+        actuator.set_to_motor()  # newer versions have more of a servo to forget
+    if np.isfinite(force):
+        actuator.ctrllimited = actuator.forcelimited = _LIMITED
+        actuator.ctrlrange = actuator.forcerange = (-force, force)
+
+
+def _follow_nothing(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int]) -> None:
+    """Remove what leads the arm after a mocap body."""
+    links = link_of(model, chain)
+    led = [i for i in range(model.neq) if is_led(model, i) and _leads(model, i, links)]
+    for name in [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, i) for i in led]:
+        _remove(spec, spec.equality(name))
+
+
+def _leads(model: mujoco.MjModel, i: int, links: np.ndarray) -> bool:
+    ends = (model.eq_obj1id[i], model.eq_obj2id[i])
+    bodies = [model.site_bodyid[end] for end in ends] if model.eq_objtype[i] == int(SITE) else ends
+    return any(links[body] > 0 for body in bodies)
+
+
+def _controls_of_keys(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int]) -> list[tuple[Any, list, list]]:
+    """Return each key frame with its controls and activations once the arm has motors."""
+    works = [actuators_of(model, joint) for joint in chain]
+    gone = {actuator for several in works for actuator in several[1:]}
+    arm = {actuator for several in works for actuator in several}
+    stay = [one for one in range(model.actuator_trntype.size) if one not in gone]
+    added = sum(not several for several in works) * [0.0]
+    first, count = model.actuator_actadr, model.actuator_actnum
+    controls = np.append(getattr(model, "actuator_ctrladr", np.arange(model.nu)), model.nu)
+    found = []
+    for key, ctrl, act in zip(spec.keys, model.key_ctrl, model.key_act, strict=True):
+        kept = [[0.0] if one in arm else ctrl[controls[one] : controls[one + 1]] for one in stay]
+        active = [act[first[one] : first[one] + count[one]] for one in stay if one not in arm and count[one]]
+        found.append((key, [*np.concatenate([[], *kept]), *added], list(np.concatenate([[], *active]))))
+    return found
+
+
+def _remove(spec: mujoco.MjSpec, thing: Any) -> None:
+    """Remove a part of a scene; before MuJoCo 3.5 parts remove themselves."""
+    if hasattr(thing, "delete"):
+        thing.delete()
+    else:
+        spec.delete(thing)
