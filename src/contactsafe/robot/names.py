@@ -34,6 +34,20 @@ def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
     return f"'{name}'" if name else f"{number} (without a name)"
 
 
+def several(
+    model: mujoco.MjModel, kind: mujoco.mjtObj, numbers: list[int], has: str = "has", have: str = "have"
+) -> str:
+    """Begin a sentence on one thing or several: "joint 'a' has", "joints 'a', 'b' have"."""
+    word = kind.name.removeprefix("mjOBJ_").lower()
+    names = listed(label(model, kind, number) for number in numbers)
+    return f"{word} {names} {has}" if len(numbers) == 1 else f"{word}s {names} {have}"
+
+
+def numbered(values: Iterable[float]) -> str:
+    """Write numbers for a message."""
+    return ", ".join(f"{value:.4g}" for value in values)
+
+
 def listed(names: Iterable[object]) -> str:
     """Write names for a message, the first dozen of them."""
     words = [str(name) for name in names]

@@ -8,7 +8,8 @@ from contactsafe.robot.description import Tip, Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import FLANGE, HAND, WIPER
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.torque_driven import Flange, make_torque_driven
+from contactsafe.robot.spec_parts import Flange
+from contactsafe.robot.torque_driven import make_torque_driven
 from contactsafe.robot.urdf_file import urdf_spec
 from contactsafe.robot.user_mjcf import ArmOptions, from_mjcf
 from contactsafe.robot.user_urdf import from_urdf

@@ -1,37 +1,21 @@
 """A downloaded model made fit for the controller: motors in place of servos, a site at the flange, the timestep."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.bodies import link_of
 from contactsafe.robot.findings import Findings
+from contactsafe.robot.missing_meshes import find_meshes
 from contactsafe.robot.names import BODY, JOINT, SITE, find
+from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, remove
 from contactsafe.robot.user_chain import choose_chain, is_led, refuse_tied
 from contactsafe.robot.user_limits import torque_limits
-
-_LIMITED = int(mujoco.mjtLimited.mjLIMITED_TRUE)
-
-
-class Flange(NamedTuple):
-    """An end-effector point in a model that has no site there.
-
-    Attributes:
-        body: that carries it.
-        position: in that body's frame, m.
-        quat: of the tool's axes in that body's frame, w x y z.
-        name: of the site that is made.
-    """
-
-    body: str
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    name: str = "flange"
 
 
 def make_torque_driven(
@@ -65,13 +49,47 @@ def make_torque_driven(
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise InvalidInputError(f"spec is {type(spec).__name__}; give the mujoco.MjSpec of the scene")
-    _name_all(spec)
-    name, findings = add_flange(spec, site), Findings()
-    model = compiled_spec(spec, "the MjSpec")
-    chain = choose_chain(model, find(model, SITE, name), joints, findings, several=True)
-    limits = torque_limits(model, chain, tau_max, findings)
-    _follow_nothing(spec, model, chain)
+    findings = Findings()
+    name, model, chain, limits = _examine(spec, site, joints, tau_max, findings)
     findings.raise_problems()
+    _edit(spec, model, chain, limits, timestep)
+    refuse_tied(compiled_spec(spec, "the edited MjSpec"), chain, findings)
+    findings.raise_problems()
+    findings.warn(spec.modelname)
+    return name
+
+
+def torque_driven_copy(
+    spec: mujoco.MjSpec, site: str | Flange, joints: Sequence[str] | None, tau_max: ArrayLike | None, findings: Findings
+) -> tuple[mujoco.MjSpec, str]:
+    """Return a scene as `make_torque_driven` edits it, as far as its problems let it, and the site's name.
+
+    Args:
+        spec: of the scene; stays as it is.
+        site, joints, tau_max: as of `make_torque_driven`.
+        findings: told of problems and notes.
+    """
+    spec = spec.copy()
+    name, model, chain, limits = _examine(spec, site, joints, tau_max, findings)
+    _edit(spec, model, chain, limits, model.opt.timestep)
+    return spec, name
+
+
+def _examine(
+    spec: mujoco.MjSpec, site: str | Flange, joints: Sequence[str] | None, tau_max: ArrayLike | None, findings: Findings
+) -> tuple[str, mujoco.MjModel, list[int], np.ndarray]:
+    """Return site, compiled scene, joints and torque limits; parts get names, and missing meshes are taken off."""
+    _name_all(spec)
+    find_meshes(spec, findings)
+    findings.raise_problems()
+    name = add_flange(spec, site)
+    model = compiled_spec(spec, "the MjSpec")
+    chain = choose_chain(model, find(model, SITE, name), joints, findings, many=True)
+    return name, model, chain, torque_limits(model, chain, tau_max, findings)
+
+
+def _edit(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int], limits: np.ndarray, timestep: float) -> None:
+    _follow_nothing(spec, model, chain)
     keys = _controls_of_keys(spec, model, chain)
     for joint, limit in zip(chain, limits, strict=True):
         _give_motor(spec, model, joint, float(limit))
@@ -82,40 +100,6 @@ def make_torque_driven(
     steps = round(timestep / model.opt.timestep)
     if steps < 1 or abs(steps * model.opt.timestep - timestep) > 1e-9:
         spec.option.timestep = timestep
-    refuse_tied(compiled_spec(spec, "the edited MjSpec"), chain, findings)
-    findings.raise_problems()
-    return name
-
-
-def compiled_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
-    """Compile a scene.
-
-    Raises:
-        InvalidInputError: MuJoCo cannot.
-    """
-    try:
-        return spec.compile()
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InvalidInputError(f"MuJoCo cannot read {what}: {reason}; mend the file") from None
-
-
-def add_flange(spec: mujoco.MjSpec, site: str | Flange) -> str:
-    """Return a site's name, made first where a `Flange` is given.
-
-    Raises:
-        InvalidInputError: there is no such body.
-    """
-    if not isinstance(site, Flange):
-        return site
-    body = spec.body(site.body)
-    if body is None:
-        names = ", ".join(one.name for one in spec.bodies if one.name)
-        raise InvalidInputError(f"body {shown(site.body)} of the flange is not in the model; give one of: {names}")
-    taken = {one.name for one in spec.sites}
-    name = next(name for name in (site.name, *(f"{site.name}{i}" for i in range(2, 100))) if name not in taken)
-    body.add_site(name=name, pos=site.position, quat=site.quat)
-    return name
 
 
 def _name_all(spec: mujoco.MjSpec) -> None:
@@ -133,7 +117,7 @@ def _give_motor(spec: mujoco.MjSpec, model: mujoco.MjModel, joint: int, limit: f
     """Let one motor turn a joint, N m, in place of all that did."""
     name, works = mujoco.mj_id2name(model, JOINT, joint), actuators_of(model, joint)
     for extra in works[1:]:
-        _remove(spec, spec.actuator(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, extra)))
+        remove(spec, spec.actuator(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, extra)))
     if works:
         motor = spec.actuator(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, works[0]))
         gear = abs(float(model.actuator_gear[works[0], 0])) or 1.0
@@ -142,26 +126,12 @@ def _give_motor(spec: mujoco.MjSpec, model: mujoco.MjModel, joint: int, limit: f
     become_motor(motor, limit / gear)
 
 
-def become_motor(actuator: Any, force: float) -> None:
-    """Make an actuator of an `MjSpec` a motor, force in both directions at its control's unit; inf for no limit."""
-    actuator.gaintype, actuator.gainprm = mujoco.mjtGain.mjGAIN_FIXED, [1.0, *9 * (0.0,)]
-    actuator.biastype, actuator.biasprm = mujoco.mjtBias.mjBIAS_NONE, np.zeros(10)
-    actuator.dyntype, actuator.dynprm = mujoco.mjtDyn.mjDYN_NONE, [1.0, *9 * (0.0,)]
-    actuator.actdim, actuator.actlimited, actuator.actrange = -1, int(mujoco.mjtLimited.mjLIMITED_FALSE), (0.0, 0.0)
-    actuator.inheritrange, actuator.plugin.active = 0.0, False
-    if hasattr(actuator, "set_to_motor"):
-        actuator.set_to_motor()  # newer versions have more of a servo to forget
-    if np.isfinite(force):
-        actuator.ctrllimited = actuator.forcelimited = _LIMITED
-        actuator.ctrlrange = actuator.forcerange = (-force, force)
-
-
 def _follow_nothing(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int]) -> None:
     """Remove what leads the arm after a mocap body."""
     links = link_of(model, chain)
     led = [i for i in range(model.neq) if is_led(model, i) and _leads(model, i, links)]
     for name in [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, i) for i in led]:
-        _remove(spec, spec.equality(name))
+        remove(spec, spec.equality(name))
 
 
 def _leads(model: mujoco.MjModel, i: int, links: np.ndarray) -> bool:
@@ -185,11 +155,3 @@ def _controls_of_keys(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[in
         active = [act[first[one] : first[one] + count[one]] for one in stay if one not in arm and count[one]]
         found.append((key, [*np.concatenate([[], *kept]), *added], list(np.concatenate([[], *active]))))
     return found
-
-
-def _remove(spec: mujoco.MjSpec, thing: Any) -> None:
-    """Remove a part of a scene; before MuJoCo 3.5 parts remove themselves."""
-    if hasattr(thing, "delete"):
-        thing.delete()
-    else:
-        spec.delete(thing)

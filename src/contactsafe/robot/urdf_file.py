@@ -10,7 +10,7 @@ import numpy as np
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.names import listed
-from contactsafe.robot.torque_driven import become_motor
+from contactsafe.robot.spec_parts import become_motor
 
 _READ = (".stl", ".obj", ".msh")
 """Kinds of meshes that MuJoCo reads."""

@@ -9,13 +9,13 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.binding import actuator_of, actuators_of
 from contactsafe.robot.bodies import link_of
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.names import JOINT, SITE, find, label, listed
+from contactsafe.robot.names import JOINT, SITE, find, label, listed, several
 
 _BODY, _EQUALITY, _HINGE = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_EQUALITY, mujoco.mjtJoint.mjJNT_HINGE
 
 
 def choose_chain(
-    model: mujoco.MjModel, site_id: int, names: Sequence[str] | None, findings: Findings, several: bool = False
+    model: mujoco.MjModel, site_id: int, names: Sequence[str] | None, findings: Findings, many: bool = False
 ) -> list[int]:
     """Choose the arm's joints among those that move a site, from base to tip.
 
@@ -24,25 +24,26 @@ def choose_chain(
         site_id: end-effector point.
         names: of the joints; None for all that move the site.
         findings: told of joints that cannot be the arm's; they are left out.
-        several: whether a joint may have several actuators, or all of them none: they get a motor each.
+        many: whether a joint may have several actuators, or all of them none: they get a motor each.
 
     Raises:
         InvalidInputError: no joint is left to be checked further.
     """
-    moving = _joints_above(model, model.site_bodyid[site_id])
+    moving = joints_above(model, model.site_bodyid[site_id])
     site, rest = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
     chosen = moving if names is None else _named(model, names, findings)
     if not moving or not chosen:
         findings.problem(f"no joints for site {site}; give it to a body of the arm; joints that move it: {rest}")
         findings.raise_problems()
-    if any(joint not in moving for joint in chosen):
-        strangers = listed(label(model, JOINT, joint) for joint in chosen if joint not in moving)
-        findings.problem(f"joint {strangers} does not move site {site}; joints that do, base to tip: {rest}")
+    strangers = [joint for joint in chosen if joint not in moving]
+    if strangers:
+        move = several(model, JOINT, strangers, "does", "do")
+        findings.problem(f"{move} not move site {site}; joints that do, base to tip: {rest}")
     chosen = [joint for joint in chosen if joint in moving]
     if chosen != [joint for joint in moving if joint in chosen]:
         findings.problem(f"joints = {list(names or ())} are not in order; from base to tip they stand so: {rest}")
         findings.raise_problems()
-    return _suitable(model, chosen, names is None, findings, several)
+    return _suitable(model, chosen, names is None, findings, many)
 
 
 def _named(model: mujoco.MjModel, names: Sequence[str], findings: Findings) -> list[int]:
@@ -55,13 +56,11 @@ def _named(model: mujoco.MjModel, names: Sequence[str], findings: Findings) -> l
     return found
 
 
-def _suitable(
-    model: mujoco.MjModel, chosen: list[int], by_itself: bool, findings: Findings, several: bool
-) -> list[int]:
+def _suitable(model: mujoco.MjModel, chosen: list[int], by_itself: bool, findings: Findings, many: bool) -> list[int]:
     """Return those of the joints that are hinges, and tell of the others; of all, where they are to have actuators."""
     hinges = [joint for joint in chosen if model.jnt_type[joint] == _HINGE]
     bare = [joint for joint in hinges if by_itself and not actuators_of(model, joint)]
-    if several and len(bare) == len(hinges):  # driven otherwise, by a mocap body or by nothing: all are to get motors
+    if many and len(bare) == len(hinges):  # driven otherwise, by a mocap body or by nothing: all are to get motors
         bare = []
     fit = [str(mujoco.mj_id2name(model, JOINT, joint)) for joint in hinges if joint not in bare]
     those = f"; those that fit are joints={fit}" if 2 <= len(fit) < len(chosen) else ""
@@ -72,9 +71,10 @@ def _suitable(
             f"it, to lock it{those}"
         )
     if bare:
-        one = f"joint {listed(label(model, JOINT, joint) for joint in bare)} has no actuator"
-        findings.problem(f"{one}; give joints=[...] with it, or without it, to lock it{those}")
-    for joint in hinges if not several else []:
+        it = "it" if len(bare) == 1 else "them"
+        remedy = f"give joints=[...] with {it}, or without {it}, to lock {it}"
+        findings.problem(f"{several(model, JOINT, bare)} no actuator; {remedy}{those}")
+    for joint in hinges if not many else []:
         with findings.noting():
             actuator_of(model, joint)
     driven = [joint for joint in hinges if joint not in bare]
@@ -84,7 +84,7 @@ def _suitable(
     return driven
 
 
-def _joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     """Find all joints between the world and a body, from the world on."""
     joints: list[int] = []
     while body != 0:
@@ -105,9 +105,9 @@ def refuse_weightless(model: mujoco.MjModel, chain: list[int], findings: Finding
         )
 
 
-def refuse_tied(model: mujoco.MjModel, chain: list[int], findings: Findings) -> None:
+def refuse_tied(model: mujoco.MjModel, chain: list[int], findings: Findings, may_be_led: bool = False) -> None:
     """Refuse equality constraints on the arm: a dynamic model of the chain alone would not know them."""
-    for i in ties(model, chain):
+    for i in (i for i in ties(model, chain) if not (may_be_led and is_led(model, i))):
         findings.problem(
             f"equality constraint {label(model, _EQUALITY, i)} ties the arm; an arm is a free chain of hinges, "
             "remove it"

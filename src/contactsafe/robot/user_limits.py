@@ -9,7 +9,7 @@ from contactsafe.robot.arm import finite_array
 from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.friction import DRY_STEEP
-from contactsafe.robot.names import JOINT, label, listed
+from contactsafe.robot.names import JOINT, label, numbered, several
 
 FRICTION_SHARE = 0.8
 """Of the friction that a file declares, what is in the model and compensated; more than there is drives a joint."""
@@ -50,7 +50,7 @@ def torque_limits(model: mujoco.MjModel, chain: list[int], given: ArrayLike | No
         model: of the scene.
         chain: the arm's joints.
         given: (n,), N m; None for the model's alone.
-        findings: told of joints without a limit, which have 1 N m then.
+        findings: told of joints without a limit, whose limit is inf then.
     """
     limits = np.array([torque_limit(model, joint) for joint in chain])
     if given is not None:
@@ -59,12 +59,12 @@ def torque_limits(model: mujoco.MjModel, chain: list[int], given: ArrayLike | No
     remedy = f"give tau_max=[...], {len(chain)} numbers in N m, and its motor a forcerange on both sides of 0"
     unlimited = [joint for joint, limit in zip(chain, limits, strict=True) if not limit < np.inf]
     if unlimited:
-        findings.problem(f"joint {listed(label(model, JOINT, one) for one in unlimited)} has no torque limit; {remedy}")
+        findings.problem(f"{several(model, JOINT, unlimited)} no torque limit; {remedy}")
     for joint, limit in zip(chain, limits, strict=True):
         if not limit > 0.0:
             one = f"joint {label(model, JOINT, joint)} has a torque limit of {limit:g} N m, which is not above 0"
             findings.problem(f"{one}; {remedy}")
-    return np.where((limits > 0.0) & (limits < np.inf), limits, 1.0)
+    return np.where(limits > 0.0, limits, np.inf)
 
 
 def torque_limit(model: mujoco.MjModel, joint: int) -> float:
@@ -135,12 +135,13 @@ def declared_friction(
     dofs = model.jnt_dofadr[chain]
     viscous = model.dof_damping[dofs] + [_through_gears(model, joint, "actuator_damping") for joint in chain]
     dry = model.dof_frictionloss[dofs]
-    for joint, damping, loss, limit in zip(chain, viscous, dry, tau_max, strict=True):
-        if loss >= limit or damping * _SLOWEST_RAD_S > limit:
-            findings.problem(
-                f"joint {label(model, JOINT, joint)} has damping {damping:g} N m s/rad and frictionloss {loss:g} N m, "
-                f"which its torque limit of {limit:g} N m does not move; lower them"
-            )
+    stuck = (dry >= tau_max) | (viscous * _SLOWEST_RAD_S > tau_max)
+    if stuck.any():
+        joints = several(model, JOINT, [joint for joint, is_stuck in zip(chain, stuck, strict=True) if is_stuck])
+        findings.problem(
+            f"{joints} frictionloss {numbered(dry[stuck])} N m and damping {numbered(viscous[stuck])} N m s/rad, which "
+            f"torque limits of {numbered(tau_max[stuck])} N m do not move; lower them, servos hide such friction"
+        )
     most = _CHANGE / _TICK_S * _least_inertia(nominal)
     damping = np.minimum(FRICTION_SHARE * viscous, most)
     drag = np.column_stack([damping, 0.0 * viscous, np.minimum(FRICTION_SHARE * dry, most / (0.5 * DRY_STEEP))])

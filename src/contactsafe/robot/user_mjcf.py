@@ -21,10 +21,12 @@ from contactsafe.robot.bodies import inertia_of, link_of, shown_by
 from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.names import JOINT, SITE, find
+from contactsafe.robot.missing_meshes import find_meshes
+from contactsafe.robot.names import JOINT, SITE, find, several
+from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec
 from contactsafe.robot.surface import geom_surface
-from contactsafe.robot.torque_driven import Flange, add_flange, become_motor, compiled_spec, make_torque_driven
-from contactsafe.robot.user_chain import choose_chain, refuse_tied, refuse_weightless
+from contactsafe.robot.torque_driven import torque_driven_copy
+from contactsafe.robot.user_chain import choose_chain, joints_above, refuse_tied, refuse_weightless
 from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame, note_home
 from contactsafe.robot.user_limits import declared_friction, joint_range, rotor, torque_limits, torque_rate
 
@@ -89,13 +91,22 @@ def from_mjcf(
             or a range is no number. All that is found is told at once.
     """
     refuse_options(options)
-    torque = options.get("actuators") is not None
-    model, name = _loaded(scene, site, joints, options if torque else None)
-    findings, site_id = Findings(), find(model, SITE, name)
-    chain = choose_chain(model, site_id, joints, findings, several=torque)
+    torque, findings = options.get("actuators") is not None, Findings()
+    if isinstance(scene, mujoco.MjModel):
+        model, name = scene, _site_of(site)
+    else:
+        spec, what = _spec(scene)
+        if torque:
+            spec, name = torque_driven_copy(spec, site, joints, options.get("tau_max"), findings)
+        else:
+            find_meshes(spec, findings)
+            name = add_flange(spec, site)
+        model = compiled_spec(spec, what)
+    site_id = find(model, SITE, name)
+    chain = choose_chain(model, site_id, joints, findings, many=torque)
     if not torque:
         refuse_weightless(model, chain, findings)
-        refuse_tied(model, chain, findings)
+    refuse_tied(model, chain, findings, may_be_led=torque)
     arm = _arm(Found(model, mujoco.MjData(model), chain, site_id), options, findings)
     findings.warn(arm.name)
     return arm
@@ -182,15 +193,16 @@ def _note_unserved(model: mujoco.MjModel, chain: list[int], findings: Findings) 
             f"{len(chain)} joints cannot serve all six coordinates of a pose: what they do not reach of a target stays "
             "an error, and a move along a straight line of poses raises UnreachableError"
         )
-    sprung = [
-        name for name, joint in zip(_names(model, chain), chain, strict=True) if model.jnt_stiffness[joint] != 0.0
-    ]
+    standing = [joint for joint in joints_above(model, model.jnt_bodyid[chain[0]]) if joint not in chain]
+    free = [joint for joint in standing if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE]
+    if free:
+        findings.note(
+            f"{several(model, JOINT, free, 'lets', 'let')} the base move, which is taken to stand still; bolt it down, "
+            "or what moves it is felt as a contact"
+        )
+    sprung = [joint for joint in chain if model.jnt_stiffness[joint] != 0.0]
     if sprung:
-        findings.note(f"joints {', '.join(sprung)} have a spring (stiffness), which is felt as a contact; set it to 0")
-
-
-def _names(model: mujoco.MjModel, chain: list[int]) -> list[str]:
-    return [str(mujoco.mj_id2name(model, JOINT, joint)) for joint in chain]
+        findings.note(f"{several(model, JOINT, sprung)} a spring (stiffness), which is felt as a contact; set it to 0")
 
 
 def _joints(
@@ -204,22 +216,12 @@ def _joints(
     )
 
 
-def _loaded(
-    scene: object, site: str | Flange, joints: Sequence[str] | None, torque: ArmOptions | None
-) -> tuple[mujoco.MjModel, str]:
-    """Return the compiled scene and the site's name; with motors where `torque` is given, a copy of the scene."""
-    if isinstance(scene, mujoco.MjModel):
-        if isinstance(site, Flange):
-            raise InvalidInputError(
-                "a compiled MjModel takes no more sites; give the path or the MjSpec with the Flange, or a site's name"
-            )
-        return scene, site
-    spec, what = _spec(scene)
-    if torque is not None:
-        name = make_torque_driven(spec, site, joints, tau_max=torque.get("tau_max"))
-    else:
-        name = add_flange(spec, site)
-    return compiled_spec(spec, what), name
+def _site_of(site: str | Flange) -> str:
+    if isinstance(site, Flange):
+        raise InvalidInputError(
+            "a compiled MjModel takes no more sites; give the path or the MjSpec with the Flange, or a site's name"
+        )
+    return site
 
 
 def _spec(scene: object) -> tuple[mujoco.MjSpec, str]:

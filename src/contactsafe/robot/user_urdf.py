@@ -8,7 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from contactsafe.robot.arm import Arm
-from contactsafe.robot.torque_driven import compiled_spec
+from contactsafe.robot.spec_parts import compiled_spec
 from contactsafe.robot.urdf_file import limit_of, robot_of, urdf_spec
 from contactsafe.robot.user_mjcf import ArmOptions, from_mjcf
 
