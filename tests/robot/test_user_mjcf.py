@@ -208,7 +208,7 @@ def test_joints_of_an_arm_without_motors_are_named_and_limited_by_the_caller():
     assert_array_equal(arm.tau_max, 5.0)
     with pytest.raises(InvalidInputError) as caught:
         arm.bind(bare, tick_s=0.002)
-    assert str(caught.value) == """joint 'a' has no motor; add <motor joint="a"/> to <actuator>"""
+    assert str(caught.value) == """joints 'a', 'b' have no motor; add <motor joint="a"/> to <actuator>"""
 
 
 MOTOR_A = '<motor joint="a" ctrlrange="-5 5" gear="3" armature="0.002"/>'
@@ -306,8 +306,8 @@ def test_missing_and_broken_files_are_refused(tmp_path):
         ),
         (
             ["<worldbody>", '<option timestep="0.0007"/><worldbody>'],
-            "the model's timestep of 0.0007 s does not divide the controller's tick of 0.001 s; "
-            """set <option timestep="0.001"/>""",
+            "the model's timestep of 0.0007 s does not divide the controller's tick of 0.002 s; "
+            """set <option timestep="0.002"/>""",
         ),
         (['name="b"', 'name="c"', 'joint="b"', 'joint="c"'], "joint 'b' is not in the model; give one of: a, c"),
     ],
@@ -316,7 +316,7 @@ def test_missing_and_broken_files_are_refused(tmp_path):
 def test_model_that_the_arm_cannot_be_bound_to_is_refused(replacements, text):
     arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(ELBOW), site="tip")
     with pytest.raises(InvalidInputError) as caught:
-        arm.bind(edited(ELBOW, *replacements))
+        arm.bind(edited(ELBOW, *replacements), tick_s=0.002)
     assert str(caught.value) == text
 
 

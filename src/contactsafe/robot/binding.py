@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.names import ACTUATOR, JOINT, find, label, listed
+from contactsafe.robot.names import ACTUATOR, JOINT, find, label, listed, several
 from contactsafe.robot.wrist import Wrist, WristNames, find_wrist
 
 
@@ -49,13 +49,17 @@ def bind_joints(
     names: Sequence[str], site: str, model: mujoco.MjModel, tick_s: float, wrist: WristNames | None
 ) -> Binding:
     """Find joints, their motors and the sensors at the wrist in a model; see `Arm.bind`."""
-    findings, motors = Findings(), []
+    findings, motors = Findings(), list[int | None]()
     joints = [find(model, JOINT, name) for name in names]
     for joint in joints:
         with findings.noting():
-            motors.append(_actuator_on(model, joint))
+            motors.append(actuator_of(model, joint))
+    bare = [joint for joint in joints if not actuators_of(model, joint)]
+    if bare:
+        remedy = f"""add <motor joint="{mujoco.mj_id2name(model, JOINT, bare[0])}"/> to <actuator>"""
+        findings.problem(f"{several(model, JOINT, bare)} no motor; {remedy}")
     with findings.noting():
-        _refuse_servos(model, motors, site)
+        _refuse_servos(model, [motor for motor in motors if motor is not None], site)
     steps = round(tick_s / model.opt.timestep)
     if steps < 1 or abs(steps * model.opt.timestep - tick_s) > 1e-9:
         findings.problem(
@@ -63,11 +67,12 @@ def bind_joints(
             f'set <option timestep="{tick_s:g}"/>'
         )
     findings.raise_problems()
+    driven = [motor for motor in motors if motor is not None]
     return Binding(
         qpos=model.jnt_qposadr[joints].astype(int),
         dof=model.jnt_dofadr[joints].astype(int),
-        ctrl=controls_of(model, motors),
-        gear=np.array([torque_per_control(model, motor) for motor in motors]),
+        ctrl=controls_of(model, driven),
+        gear=np.array([torque_per_control(model, motor) for motor in driven]),
         steps=steps,
         wrist=_wrist(model, names[-1], site, wrist),
     )
@@ -121,14 +126,6 @@ def torque_per_control(model: mujoco.MjModel, actuator: int) -> float:
         and model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_NONE
     )
     return float(model.actuator_gainprm[actuator, 0] * model.actuator_gear[actuator, 0]) if is_motor else 0.0
-
-
-def _actuator_on(model: mujoco.MjModel, joint: int) -> int:
-    actuator = actuator_of(model, joint)
-    if actuator is None:
-        name = mujoco.mj_id2name(model, JOINT, joint)
-        raise InvalidInputError(f"""joint '{name}' has no motor; add <motor joint="{name}"/> to <actuator>""")
-    return actuator
 
 
 def _refuse_servos(model: mujoco.MjModel, actuators: list[int], site: str) -> None:

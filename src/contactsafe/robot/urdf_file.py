@@ -85,15 +85,12 @@ def _keep_what_collides(root: ET.Element, path: pathlib.Path, findings: Findings
     for link in root.findall("link"):
         for part in link.findall("visual"):
             link.remove(part)
-        for part in link.findall("collision"):
-            mesh = part.find("geometry/mesh")
-            if mesh is None:
-                continue
-            found = _mesh(mesh.get("filename", ""), path)
-            if found is None:
+        for part, mesh in [(part, part.find("geometry/mesh")) for part in link.findall("collision")]:
+            found = None if mesh is None else _mesh(mesh.get("filename", ""), path)
+            if mesh is not None and found is None:
                 missing.append(mesh.get("filename", ""))
                 link.remove(part)
-            else:
+            elif mesh is not None:
                 mesh.set("filename", str(found))
     if missing:
         findings.note(

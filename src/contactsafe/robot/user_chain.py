@@ -66,10 +66,8 @@ def _suitable(model: mujoco.MjModel, chosen: list[int], by_itself: bool, finding
     those = f"; those that fit are joints={fit}" if 2 <= len(fit) < len(chosen) else ""
     for joint in (joint for joint in chosen if joint not in hinges):
         word = mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower()
-        findings.problem(
-            f"joint {label(model, JOINT, joint)} is of type {word}; the arm's are hinges: give joints=[...] without "
-            f"it, to lock it{those}"
-        )
+        one = f"joint {label(model, JOINT, joint)} is of type {word}; the arm's are hinges"
+        findings.problem(f"{one}: give joints=[...] without it, to lock it{those}")
     if bare:
         it = "it" if len(bare) == 1 else "them"
         remedy = f"give joints=[...] with {it}, or without {it}, to lock {it}"

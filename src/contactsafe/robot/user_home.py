@@ -7,17 +7,13 @@ from numpy.typing import ArrayLike
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import finite_array, finite_range
 from contactsafe.robot.binding import actuators_of
-from contactsafe.robot.bodies import base_bodies, link_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.names import JOINT, label, listed
 
-_BODY, _KEY = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY
+_KEY = mujoco.mjtObj.mjOBJ_KEY
 
 HOME = "home"
 """The key frame that is taken where none is named."""
-
-_MARGIN_RAD, _MARGIN_OF_RANGE = 0.2, 0.25
-"""Distance from the end of a range at which the stops of `presets.safe` begin, and at most this part of the range."""
 
 
 def key_frame(model: mujoco.MjModel, chain: list[int], asked: str | None, findings: Findings) -> int:
@@ -120,48 +116,3 @@ def _is_angle(model: mujoco.MjModel, joint: int) -> bool:
     """Tell whether a motor on a joint has the joint's range for its range of control."""
     works = [one for one in actuators_of(model, joint) if model.actuator_ctrllimited[one]]
     return any(np.allclose(model.actuator_ctrlrange[one], model.jnt_range[joint], atol=0.05) for one in works)
-
-
-def note_home(
-    model: mujoco.MjModel, data: mujoco.MjData, chain: list[int], home: np.ndarray, findings: Findings
-) -> None:
-    """Tell of a home beside the end of a joint's range, or where the arm touches something.
-
-    Args:
-        model: of the scene.
-        data: of it; the arm is moved home.
-        chain: the arm's joints.
-        home: (n,), rad.
-        findings: told of both.
-    """
-    for joint, angle in zip(chain, home, strict=True):
-        low, high = model.jnt_range[joint]
-        margin = min(_MARGIN_RAD, _MARGIN_OF_RANGE * (high - low))
-        if model.jnt_limited[joint] and min(angle - low, high - angle) < margin:
-            findings.note(
-                f"home = {angle:.3g} rad of joint {label(model, JOINT, joint)} is within {margin:.2g} rad of an end of "
-                f"its range [{low:.3g}, {high:.3g}], where joint stops push back; give home=[...] further inside"
-            )
-    data.qpos[model.jnt_qposadr[chain]] = home
-    mujoco.mj_fwdPosition(model, data)
-    touching = _touching(model, data, chain)
-    if touching:
-        findings.note(
-            f"at home the arm touches something: {listed(touching)}; that is felt as a contact, so leave out the pair "
-            "(<contact><exclude .../></contact>), or give another home=[...]"
-        )
-
-
-def _touching(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> list[str]:
-    """Return the pairs of bodies that touch, of which one is moved by the arm and the other is not alike."""
-    links, base = link_of(model, chain), base_bodies(model, chain)
-    pairs = []
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        if min(contact.geom1, contact.geom2) < 0:  # a flexible body's
-            continue
-        first, second = sorted(int(model.geom_bodyid[geom]) for geom in (contact.geom1, contact.geom2))
-        apart = links[first] != links[second] or base[first] or base[second]
-        if contact.dist < 0.0 and apart and max(links[first], links[second]) > 0:
-            pairs.append(f"{label(model, _BODY, first)} on {label(model, _BODY, second)}")
-    return list(dict.fromkeys(pairs))

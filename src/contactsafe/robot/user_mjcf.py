@@ -22,13 +22,14 @@ from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.missing_meshes import find_meshes
-from contactsafe.robot.names import JOINT, SITE, find, several
+from contactsafe.robot.names import JOINT, SITE, find
 from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec
 from contactsafe.robot.surface import geom_surface
 from contactsafe.robot.torque_driven import torque_driven_copy
-from contactsafe.robot.user_chain import choose_chain, joints_above, refuse_tied, refuse_weightless
-from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame, note_home
+from contactsafe.robot.user_chain import choose_chain, refuse_tied, refuse_weightless
+from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame
 from contactsafe.robot.user_limits import declared_friction, joint_range, rotor, torque_limits, torque_rate
+from contactsafe.robot.user_notes import note_home, note_unserved
 
 _GRAVITY_MAX = 1e3  # m/s²
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
@@ -158,7 +159,7 @@ def _arm(found: Found, options: ArmOptions, findings: Findings) -> Arm:
         carried_tool(found, options.get("tip")),
     )
     note_home(model, data, chain, home, findings)
-    _note_unserved(model, chain, findings)
+    note_unserved(model, chain, nominal, home, findings)
     return Arm(
         name, nominal, str(mujoco.mj_id2name(model, SITE, found.site)), q_min, q_max, np.full(n, np.inf), limits, rate,
         friction, home, description, tool, surface, _LEVER_DOUBTED, drag=drag, friction_unknown=unknown,
@@ -184,25 +185,6 @@ def _gravity(nominal: mujoco.MjModel, q: np.ndarray) -> np.ndarray:
     data.qpos[:] = q
     mujoco.mj_forward(nominal, data)
     return data.qfrc_bias.copy()
-
-
-def _note_unserved(model: mujoco.MjModel, chain: list[int], findings: Findings) -> None:
-    """Tell what the controller's model of the arm leaves out, and what such an arm cannot do."""
-    if len(chain) < 6:
-        findings.note(
-            f"{len(chain)} joints cannot serve all six coordinates of a pose: what they do not reach of a target stays "
-            "an error, and a move along a straight line of poses raises UnreachableError"
-        )
-    standing = [joint for joint in joints_above(model, model.jnt_bodyid[chain[0]]) if joint not in chain]
-    free = [joint for joint in standing if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE]
-    if free:
-        findings.note(
-            f"{several(model, JOINT, free, 'lets', 'let')} the base move, which is taken to stand still; bolt it down, "
-            "or what moves it is felt as a contact"
-        )
-    sprung = [joint for joint in chain if model.jnt_stiffness[joint] != 0.0]
-    if sprung:
-        findings.note(f"{several(model, JOINT, sprung)} a spring (stiffness), which is felt as a contact; set it to 0")
 
 
 def _joints(
