@@ -37,7 +37,15 @@ def urdf_spec(path: str | os.PathLike, link: str) -> tuple[mujoco.MjSpec, str]:
     Raises:
         InvalidInputError: the file cannot be read or has no such link.
     """
-    root, findings = robot_of(path), Findings()
+    findings = Findings()
+    spec, site = read_urdf(path, link, findings)
+    findings.warn(spec.modelname)
+    return spec, site
+
+
+def read_urdf(path: str | os.PathLike, link: str, findings: Findings) -> tuple[mujoco.MjSpec, str]:
+    """Read a URDF as `urdf_spec` does, and tell `findings` of missing meshes."""
+    root = robot_of(path)
     names = [one.get("name", "") for one in root.findall("link")]
     if link not in names:
         raise InvalidInputError(f"{os.fspath(path)} has no link {shown(link)}; give one of {listed(names)}")
@@ -51,7 +59,6 @@ def urdf_spec(path: str | os.PathLike, link: str) -> tuple[mujoco.MjSpec, str]:
     (spec.body(link) or spec.worldbody).add_site(name=site)  # the root link is the world
     spec.option.timestep = 0.001
     _give_motors(spec, root)
-    findings.warn(root.get("name", ""))
     return spec, site
 
 

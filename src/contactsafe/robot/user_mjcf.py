@@ -103,7 +103,14 @@ def from_mjcf(
             find_meshes(spec, findings)
             name = add_flange(spec, site)
         model = compiled_spec(spec, what)
-    site_id = find(model, SITE, name)
+    return arm_in(model, name, joints, options, findings)
+
+
+def arm_in(
+    model: mujoco.MjModel, site: str, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
+) -> Arm:
+    """Return the arm in a compiled scene, and tell what was found; see `from_mjcf`."""
+    site_id, torque = find(model, SITE, site), options.get("actuators") is not None
     chain = choose_chain(model, site_id, joints, findings, many=torque)
     if not torque:
         refuse_weightless(model, chain, findings)

@@ -8,9 +8,10 @@ from typing import Unpack
 import numpy as np
 
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.findings import Findings
 from contactsafe.robot.spec_parts import compiled_spec
-from contactsafe.robot.urdf_file import limit_of, robot_of, urdf_spec
-from contactsafe.robot.user_mjcf import ArmOptions, from_mjcf
+from contactsafe.robot.urdf_file import limit_of, read_urdf, robot_of
+from contactsafe.robot.user_mjcf import ArmOptions, arm_in, refuse_options
 
 
 def from_urdf(
@@ -31,8 +32,10 @@ def from_urdf(
     Raises:
         InvalidInputError: the file cannot be read, has no such link, or what `from_mjcf` says.
     """
-    spec, site = urdf_spec(path, link)
-    arm = from_mjcf(compiled_spec(spec, f"'{os.fspath(path)}'"), site, joints, **options)
+    refuse_options(options)
+    findings = Findings()
+    spec, site = read_urdf(path, link, findings)
+    arm = arm_in(compiled_spec(spec, f"'{os.fspath(path)}'"), site, joints, options, findings)
     speeds = {joint.get("name"): limit_of(joint, "velocity") for joint in robot_of(path).findall("joint")}
     fastest = [speeds.get(arm.model.joint(i).name, np.inf) for i in range(arm.n)]
     return replace(arm, qd_max=np.array([speed if speed > 0.0 else np.inf for speed in fastest]))
