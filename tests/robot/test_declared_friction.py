@@ -9,7 +9,7 @@ from tests.robot.worlds import SIX
 import contactsafe as cs
 from contactsafe import robots
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.user_limits import FRICTION_SHARE
+from contactsafe.robot.user_limits import FRICTION_FRACTION
 
 DAMPING = [2.0, 2.0, 1.5, 1.0, 1.0, 1.0]
 LOSS = [1.1, 1.1, 1.1, 0.7, 0.4, 0.3]
@@ -24,10 +24,10 @@ def rubbing(damping=DAMPING, loss=LOSS):
 
 def test_damping_and_frictionloss_of_the_file_were_left_out():
     arm = robots.from_mjcf(rubbing(), "tip")
-    assert_allclose(arm.drag[:, 0], FRICTION_SHARE * np.array(DAMPING))
-    assert_allclose(arm.drag[:3, 2], FRICTION_SHARE * np.array(LOSS[:3]))  # the others are lighter
+    assert_allclose(arm.drag[:, 0], FRICTION_FRACTION * np.array(DAMPING))
+    assert_allclose(arm.drag[:3, 2], FRICTION_FRACTION * np.array(LOSS[:3]))  # the others are lighter
     assert not arm.drag[:, 1].any()
-    assert_allclose(arm.friction_unknown[:, 0], (1.0 - FRICTION_SHARE) * np.array(DAMPING))
+    assert_allclose(arm.friction_unknown[:, 0], (1.0 - FRICTION_FRACTION) * np.array(DAMPING))
     assert_array_equal(arm.friction_unknown[:, 1], LOSS)
 
 
@@ -44,7 +44,7 @@ def test_damping_of_an_actuator_counts_through_its_gear():
         pytest.skip("this MuJoCo has no damping of actuators")
     model = rubbing(loss=np.zeros(6))
     model.actuator_damping[2] = 1e-4  # gear 100
-    assert_allclose(robots.from_mjcf(model, "tip").drag[2, 0], FRICTION_SHARE * 2.5)
+    assert_allclose(robots.from_mjcf(model, "tip").drag[2, 0], FRICTION_FRACTION * 2.5)
 
 
 def test_compensation_of_dry_friction_flung_a_light_joint():
@@ -52,7 +52,7 @@ def test_compensation_of_dry_friction_flung_a_light_joint():
     model = rubbing()
     model.dof_armature[:] = 1e-3
     arm = robots.from_mjcf(model, "tip")
-    assert arm.drag[5, 2] < 0.1 * FRICTION_SHARE * LOSS[5]
+    assert arm.drag[5, 2] < 0.1 * FRICTION_FRACTION * LOSS[5]
     assert arm.friction_unknown[5, 1] == LOSS[5]
 
 

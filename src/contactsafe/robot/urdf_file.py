@@ -130,7 +130,8 @@ def _places(name: str, urdf: pathlib.Path) -> list[pathlib.Path]:
     package, _, inside = rest.partition("/")
     said = [pathlib.Path(one) for key in _PLACES for one in os.environ.get(key, "").split(os.pathsep) if one]
     here = [folder / inside for folder in folders if folder.name == package]
-    return here + [folder / one for folder in (*folders, *said) for one in (rest, f"share/{rest}")]
+    below = [found for folder in said for found in sorted(folder.glob(f"*/{rest}"))]  # as ROS 2 installs them
+    return [*here, *(folder / rest for folder in (*folders, *said)), *below]
 
 
 def _give_motors(spec: mujoco.MjSpec, root: ET.Element) -> None:

@@ -120,7 +120,7 @@ def ties(model: mujoco.MjModel, chain: list[int]) -> list[int]:
 
 
 def is_led(model: mujoco.MjModel, i: int) -> bool:
-    """Tell whether an equality constraint leads a body after a mocap body: another way of driving an arm."""
+    """Tell whether an equality constraint leads a body after a mocap body: which drives an arm otherwise."""
     return any(model.body_mocapid[body] >= 0 for body in _ends(model, i))
 
 

@@ -11,7 +11,7 @@ from contactsafe.robot.findings import Findings
 from contactsafe.robot.friction import DRY_STEEP
 from contactsafe.robot.names import JOINT, label, numbered, several
 
-FRICTION_SHARE = 0.8
+FRICTION_FRACTION = 0.8
 """Of the friction that a file declares, what is in the model and compensated; more than there is drives a joint."""
 
 _CHANGE, _TICK_S = 0.1, 1e-3
@@ -118,7 +118,7 @@ def declared_friction(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the friction that the file declares, as the model has it and as it is unknown.
 
-    `FRICTION_SHARE` of damping and frictionloss is in the model, less on joints so light that a sampled loop which
+    `FRICTION_FRACTION` of damping and frictionloss is in the model, less on joints so light that a sampled loop which
     compensates it would drive them: at most 1/10 of their speed may change in a tick, with the tick of 1 ms. Unknown is
     the rest of the damping, and all of the frictionloss: at rest it is anything from one end to the other.
 
@@ -143,8 +143,8 @@ def declared_friction(
             f"torque limits of {numbered(tau_max[stuck])} N m do not move; lower them, servos hide such friction"
         )
     most = _CHANGE / _TICK_S * _least_inertia(nominal)
-    damping = np.minimum(FRICTION_SHARE * viscous, most)
-    drag = np.column_stack([damping, 0.0 * viscous, np.minimum(FRICTION_SHARE * dry, most / (0.5 * DRY_STEEP))])
+    damping = np.minimum(FRICTION_FRACTION * viscous, most)
+    drag = np.column_stack([damping, 0.0 * viscous, np.minimum(FRICTION_FRACTION * dry, most / (0.5 * DRY_STEEP))])
     return drag, np.column_stack([viscous - damping, dry])
 
 
