@@ -53,7 +53,9 @@ def record(path: Path) -> None:
 
 
 def _run(arm, motion, met, run, Worlds):
-    config = motion.world(tuple(meeting.obstacle for meeting in met), True)
+    from contactsafe.sim.config import REAL_SENSORS
+
+    config = motion.world(tuple(meeting.obstacle for meeting in met), REAL_SENSORS)
     worlds = Worlds(arm, [config], cs.presets.safe(), 1, [motion.seed])
     traces = run(worlds, [motion])
     worlds.close()

@@ -31,6 +31,7 @@ from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.worlds import Worlds
 from contactsafe.tasks.base.episodes import TaskEpisodes
 from contactsafe.tasks.base.pushes import Pushes
@@ -263,7 +264,7 @@ def envs():
 def playback():
     arm = cs.robots.panda()
     motions = [sample_motion(arm, 0), sample_motion(arm, 1)]
-    return Playback(Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1]), motions)
+    return Playback(Worlds(arm, [motion.world((), REAL_SENSORS) for motion in motions], n=2, seed=[0, 1]), motions)
 
 
 def late_worlds():
@@ -277,7 +278,7 @@ def late_worlds():
 def late_playback():
     arm = cs.robots.panda()
     motions = [sample_motion(arm, 0), sample_motion(arm, 1)]
-    worlds = Worlds(arm, [motion.world((), True) for motion in motions], n=2, seed=[0, 1])
+    worlds = Worlds(arm, [motion.world((), REAL_SENSORS) for motion in motions], n=2, seed=[0, 1])
     return LatePlayback(worlds, motions, 200, 2 * [(30, 60)])
 
 
@@ -396,7 +397,7 @@ def is_plain(kind):
 
 HANDED_OVER = {
     "FrankaPort", "InsertionRobot", "InsertionWork", "MovedBlock", "WipingRobot", "WipedBoard", "CameraPictures",
-    "PhotographedBoard", "Square", "Distorted",
+    "PandaPort", "PhotographedBoard", "Drawing", "Square", "Distorted", "View", "PlaneView",
 }  # fmt: skip
 """What a run hands to its processes before any of it begins, pickled: `tests/hardware` has runs. Until then it is a
 plain record of what it was made of; the lenses are arrays."""

@@ -15,6 +15,7 @@ from contactsafe.experiments.motions import Playback
 from contactsafe.experiments.surfaces import clearance
 from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.shape import link_frames
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
@@ -23,7 +24,7 @@ from contactsafe.sim.worlds import MAX_TICKS, Worlds
 def push_or_obstacle() -> None:
     """The bare sign of the work is wrong where an arm moves; with its errors, and what yielding brings, it is not."""
     scenes = Scenes(48)
-    real = [motion.world(met, True) for motion, met in zip(scenes.motions, scenes.obstacles, strict=True)]
+    real = [motion.world(met, REAL_SENSORS) for motion, met in zip(scenes.motions, scenes.obstacles, strict=True)]
     found: dict[str, list[list[int]]] = {}
     for config in (FAST, SAFE):
         for kind, traces in (("a sweep into an obstacle", scenes.run(config, real)), ("", _pushed(scenes, config))):

@@ -18,6 +18,7 @@ from contactsafe.experiments.collision_scenes import met_links, sample_meetings,
 from contactsafe.experiments.motions import Playback, record
 from contactsafe.experiments.surfaces import clearance
 from contactsafe.robot import robots
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
 ARM = robots.panda()
@@ -73,8 +74,8 @@ def test_targets_go_from_start_to_end_no_faster_than_their_speed(motion):
 
 def test_the_real_plant_differs_and_the_clean_one_does_not():
     motion = MOTIONS[0]
-    assert motion.world((), real=True).plant == motion.plant
-    assert motion.world((), real=False).plant.payload_kg == 0.0
+    assert motion.world((), REAL_SENSORS).plant == motion.plant
+    assert motion.world((), None).plant.payload_kg == 0.0
     for seed in range(20):
         plant = sample_plant(scene_rng(seed, 0), ARM.n)
         assert all(0.8 <= scale <= 1.2 for scale in plant.friction_scale)
@@ -96,7 +97,9 @@ def test_obstacles_are_within_their_ranges_and_one_in_eight_is_fixed():
 @pytest.fixture(scope="module")
 def played():
     motions = MOTIONS[:8]
-    worlds = Worlds(ARM, [motion.world((), True) for motion in motions], presets.vices(), len(motions), list(range(8)))
+    worlds = Worlds(
+        ARM, [motion.world((), REAL_SENSORS) for motion in motions], presets.vices(), len(motions), list(range(8))
+    )
     traces = record(worlds, motions)
     worlds.close()
     return motions, traces
@@ -134,7 +137,7 @@ def test_obstacles_touch_the_arm_where_and_when_they_say(played):
 
 def test_a_playback_runs_a_single_tick_of_what_is_over():
     short, long = sorted(MOTIONS[:8], key=lambda motion: motion.duration_s)[::7]
-    worlds = Worlds(ARM, [short.world((), False), long.world((), False)], presets.vices(), 2, [0, 1])
+    worlds = Worlds(ARM, [short.world((), None), long.world((), None)], presets.vices(), 2, [0, 1])
     play = Playback(worlds, [short, long])
     ticks = []
     while play.running.any():

@@ -14,6 +14,7 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.motions import record
 from contactsafe.experiments.registry import ENTRIES
 from contactsafe.robot import robots
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import Worlds
@@ -100,7 +101,7 @@ def test_worlds_lent_from_controller_to_controller_do_what_new_ones_do():
     motion = sample_motion(arm, 2)
     assert motion.holds
     thing = Obstacle((0.3, 0.1, 0.7), 0.05, 3e3, 1.0, travel=(0.1, 0.0, 0.0), travel_s=(0.2, 0.6))
-    config = motion.world((thing,), real=True)
+    config = motion.world((thing,), REAL_SENSORS)
     new = Worlds(arm, [config], presets.safe(), 1, [7])
     (expected,) = record(new, [motion])
     lent = Worlds(arm, [config], presets.paper(), 1, [7])

@@ -14,7 +14,7 @@ from contactsafe.experiments.late_worlds import (
     LateWorlds,
 )
 from contactsafe.robot import robots
-from contactsafe.sim.config import NO_NOISE, WorldConfig
+from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, WorldConfig
 from contactsafe.sim.worlds import MAX_TICKS
 
 ARM = robots.panda()
@@ -58,7 +58,7 @@ def scene():
 def play(scene, silent):
     ticks = scene.at + 200
     codes = np.full((1, ticks + MAX_TICKS), SEEN)
-    worlds = LateWorlds(ARM, [scene.motion.world((), True)], presets.safe(), [scene.seed], codes, True)
+    worlds = LateWorlds(ARM, [scene.motion.world((), REAL_SENSORS)], presets.safe(), [scene.seed], codes, True)
     trace = LatePlayback(worlds, [scene.motion], ticks, [silent]).record()
     worlds.close()
     return trace[0]

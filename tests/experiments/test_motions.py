@@ -13,6 +13,7 @@ from contactsafe.experiments.surfaces import clearance, is_uncovered, sample_sur
 from contactsafe.robot import robots
 from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.shape import link_frames
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.worlds import Worlds
 
 ARM = robots.panda()
@@ -36,7 +37,7 @@ def test_the_rest_of_a_motion_is_the_end_of_all_of_it():
     motion = sample_motion(ARM, 0)
     traces = []
     for begun_steps in (0, 7):
-        worlds = Worlds(ARM, motion.world((), real=True), presets.vices(), 1, [0])
+        worlds = Worlds(ARM, motion.world((), REAL_SENSORS), presets.vices(), 1, [0])
         play = Playback(worlds, [motion])
         for _ in range(begun_steps):
             play.step()

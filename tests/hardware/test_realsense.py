@@ -82,3 +82,18 @@ def test_closing_twice_does_no_harm(camera):
     camera.close()
     camera.close()
     assert camera.newest()[0] is None
+
+
+def test_the_serial_number_is_that_of_the_device_that_was_found(camera, device, monkeypatch):
+    assert camera.serial == ""
+    library = realsense.library()
+    known = {library.camera_info.serial_number: "4711"}
+    sensor = type("Sensor", (), {"get_stream_profiles": lambda self: [device.profile]})()
+    made = type("Device", (), {"get_info": lambda self, name: known[name], "query_sensors": lambda self: [sensor]})()
+    context = type("Context", (), {"query_devices": lambda self: [made]})
+    monkeypatch.setattr(library, "context", context)
+    found = ColourCamera()
+    assert found._find()[0] is sensor
+    assert found.serial == "4711"
+    with pytest.raises(CameraError, match="no RealSense camera 42"):
+        ColourCamera("42")._find()

@@ -1,5 +1,7 @@
 """A lens and its undoing: what is straight in the world is straight in the photograph."""
 
+import types
+
 import numpy as np
 import pytest
 
@@ -47,3 +49,21 @@ def test_what_is_no_lens_is_refused(change):
     known = {"width": 1280, "height": 720, "fx": 640.0, "fy": 640.0, "cx": 640.0, "cy": 360.0}
     with pytest.raises(InvalidInputError, match="lens"):
         Lens(**{**known, **change})
+
+
+def test_a_device_says_its_lens_as_librealsense_does():
+    known = types.SimpleNamespace(
+        width=1280, height=720, fx=1.5, fy=2.5, ppx=3.0, ppy=4.0, coeffs=[0.1, 0.2, 0.3, 0.4, 0.5]
+    )
+    assert Lens.of_realsense(known) == Lens(1280, 720, 1.5, 2.5, 3.0, 4.0, (0.1, 0.2, 0.3, 0.4, 0.5))
+
+
+def test_a_camera_turned_about_its_axis_sees_the_photograph_turned():
+    quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    lens = Lens(721, 721, 639.0, 639.0, 360.0, 360.0)
+    square = Square(lens, 455, 639.0)
+    straight, turned = (square.cut(Distorted(square, axes).picture(pattern())) for axes in (None, quarter))
+    away = np.abs(np.rot90(straight).astype(int) - turned.astype(int))[3:-3, 3:-3]
+    other = np.abs(np.rot90(straight, -1).astype(int) - turned.astype(int))[3:-3, 3:-3]
+    assert min(away.mean(), other.mean()) < 1.0
+    assert max(away.mean(), other.mean()) > 10.0

@@ -163,3 +163,24 @@ def test_cameras_that_cannot_be_are_refused(homography, corners, sizes, text):
     with pytest.raises(InvalidInputError) as caught:
         Segmenter(homography, corners, **sizes)
     assert str(caught.value) == text
+
+
+@pytest.mark.parametrize(("darkness", "thickness"), [(0.2, 3), (0.15, 3), (0.12, 4), (0.6, 1), (0.4, 1)])
+def test_faint_and_thin_strokes_were_missed(segmenter, darkness, thickness):
+    picture, where = written(board(noise=3.0), darkness, thickness)
+    found = segmenter.segment(photo(cv2.GaussianBlur(picture, (0, 0), 0.8))) == 0
+    there = cv2.resize(where, (128, 128), interpolation=cv2.INTER_AREA) > 255 * 0.10
+    around = np.ones((3, 3), np.uint8)
+    assert (there & (cv2.dilate(found.astype(np.uint8), around) > 0)).sum() > 0.97 * there.sum()
+    assert (found & (cv2.dilate(there.astype(np.uint8), around) == 0)).sum() == 0
+
+
+@pytest.mark.parametrize("gain", [30.0, 60.0, 100.0])
+@pytest.mark.parametrize("gap", [4, 8, 14])
+def test_the_gap_between_two_reflections_is_no_line(segmenter, gap, gain):
+    lamps = np.zeros((N, N))
+    lamps[100:360, 200 - gap // 2 - 8 : 200 - gap // 2] = 1.0
+    lamps[100:360, 200 + gap // 2 : 200 + gap // 2 + 8] = 1.0
+    for blur in (1.5, 3.0, 6.0):
+        lit = board(180.0, 3.0) + gain * cv2.GaussianBlur(lamps, (0, 0), blur)
+        assert (segmenter.segment(photo(lit)) == 255).all()

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import contactsafe
+from contactsafe.cli.calibrate import calibrate
 from contactsafe.cli.common import first_run
 from contactsafe.cli.evaluation import evaluate
 from contactsafe.cli.experiments import demo, experiment
@@ -35,6 +36,7 @@ COMMANDS = {
     "replay": _Command(replay, parses=True),
     "identify": _Command(identify, parses=True),
     "record": _Command(record, parses=True),
+    "calibrate": _Command(calibrate, parses=True),
     "run": _Command(run, parses=True),
     "bench": _Command(bench),
     "warmup": _Command(warmup),

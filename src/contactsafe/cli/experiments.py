@@ -17,6 +17,7 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.parse import docstring, one_of, parse, some_of
 from contactsafe.experiments import registry
 from contactsafe.experiments.config import PLANTS, Entry, ExperimentConfig, Taken
+from contactsafe.experiments.sensors import sensors_words
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.manifest import MANIFEST, digest
@@ -24,6 +25,7 @@ from contactsafe.results.experiment import Experiment, to_json
 from contactsafe.robot import robots
 from contactsafe.robot.calibrated import arm_for
 from contactsafe.robot.calibration import Calibration
+from contactsafe.sim.config import SENSORS
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 from contactsafe.tasks.base.registry import place_of
 
@@ -79,6 +81,7 @@ class Options:
         trials: seeds tried with each controller.
         seed: first seed.
         plants: collisions with an arm and sensors that have errors (real), without any (clean), or both side by side.
+        sensors: of an arm that has errors: encoders of 19 bit alone, or a Franka's torque sensors and noisy velocity.
         minutes: simulated time in which detection counts false alarms.
         out: folder for report.html, summary.json and the trials as NAME.csv.
         json: print tables, spreads and trials as JSON instead of text.
@@ -92,6 +95,7 @@ class Options:
     trials: Annotated[int | None, tyro.conf.arg(help_behavior_hint=f"(default: {_usual_trials()})")] = None
     seed: int = 0
     plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS
+    sensors: Annotated[str, one_of(SENSORS)] = ExperimentConfig.sensors
     minutes: float = ExperimentConfig.minutes
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None
     json: bool = False
@@ -146,6 +150,7 @@ def _config(asked: Options, entry: Entry) -> ExperimentConfig:
         trials,
         asked.seed,
         asked.plants,
+        asked.sensors,
         asked.minutes,
         scenes,
         bundle,
@@ -196,6 +201,7 @@ def _command(
         words += ["--calibration", str(calibration)]
     if config.plants != ExperimentConfig.plants:
         words += ["--plants", ",".join(config.plants)]
+    words += sensors_words(config.sensors)
     if config.minutes != ExperimentConfig.minutes:
         words += ["--minutes", f"{config.minutes:g}"]
     return shlex.join(words)

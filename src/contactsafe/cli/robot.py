@@ -3,7 +3,7 @@
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,6 +25,7 @@ from contactsafe.hardware.crew import Part, run_crew
 from contactsafe.hardware.ending import Ending
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.franka_port import FrankaPort
+from contactsafe.hardware.panda_port import PandaPort
 from contactsafe.hardware.realtime import Realtime
 from contactsafe.hardware.recorder import record
 from contactsafe.hardware.states import REASONS, STATES
@@ -38,11 +39,18 @@ from contactsafe.report.summary import summarise
 from contactsafe.results.experiment import to_json
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, description_and_tool
+from contactsafe.robot.description import Tool
 from contactsafe.robot.franka import HAND
 from contactsafe.sim.franka_process import SimulatedRobot
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 
 LOG, TRUTH = "run.mcap", "truth.npy"
+
+ARMS: Mapping[str, tuple[Callable[[Tool], Arm], type[FrankaPort]]] = {
+    "fr3": (robots.fr3, FrankaPort),
+    "panda": (robots.panda, PandaPort),
+}
+"""Robots by name, with what reaches them."""
 
 _LEAST_KG = 1e-3
 """A lighter load is none."""
@@ -64,6 +72,7 @@ class Options:
         policy: folder of the policy's bundle.
         task: what it does.
         robot: address of the Franka's control.
+        arm: fr3, or panda for the older one, whose port nobody has tried on a robot.
         simulated: run against a simulated Franka on this machine, over the robot's own protocol.
         seconds: that the run takes at most.
         controller: preset underneath.
@@ -71,6 +80,7 @@ class Options:
         rounds: of work, such as boards, after which a simulated run ends.
         speed: factor on how fast the target moves, 0.05 to 1.
         camera: serial number of the RealSense; the first one found where it is not given.
+        recover: acknowledge the error that stopped the robot before; look at what stopped it first.
         dry_run: look at the robot, print the checklist, move nothing.
         yes: do not ask before the robot moves.
         alone: nothing pushes or meets the simulated arm.
@@ -78,6 +88,7 @@ class Options:
         seed: of what is drawn, of light and of noise.
         out: folder for log and page.
         calibration: what `contactsafe identify` wrote of the robot.
+        camera_calibration: what `contactsafe calibrate` wrote; without it the camera stands where training had it.
         priority: of the control process under SCHED_FIFO; 0 for none.
         json: print JSON instead of a table.
     """
@@ -85,6 +96,7 @@ class Options:
     policy: Annotated[BundleFolder, tyro.conf.Positional] = None
     task: TaskName = DEFAULT_TASK
     robot: str | None = None
+    arm: Annotated[str, one_of(ARMS)] = "fr3"
     simulated: bool = False
     seconds: float = 60.0
     controller: Annotated[str, one_of(presets.PRESETS, presets.by_name, presets.FORM)] = "safe"
@@ -92,6 +104,7 @@ class Options:
     rounds: int = 3
     speed: float = 1.0
     camera: str | None = None
+    recover: bool = False
     dry_run: bool = False
     yes: bool = False
     alone: bool = False
@@ -99,6 +112,7 @@ class Options:
     seed: int = 0
     out: Path = Path("runs/robot")
     calibration: CalibrationFile = None
+    camera_calibration: CalibrationFile = None
     priority: int = 80
     json: bool = False
 
@@ -114,8 +128,10 @@ class Options:
             raise InvalidInputError(f"rounds = {self.rounds}; give 1 to 60")
         if not 0 <= self.priority <= 99:
             raise InvalidInputError(f"priority = {self.priority}; give 1 to 99, or 0 for none")
-        if self.simulated and self.dry_run:
-            raise InvalidInputError("dry_run is for real robots; a simulated one may move")
+        if self.simulated and (self.dry_run or self.recover):
+            raise InvalidInputError("dry_run and recover are for real robots; a simulated one may move")
+        if self.simulated and self.arm != "fr3":
+            raise InvalidInputError(f"arm = {self.arm}: the simulated robot is an fr3; leave that out")
         if self.robot is not None and self.lockstep:
             raise InvalidInputError("lockstep is for simulated robots; a real one does not wait")
 
@@ -129,32 +145,47 @@ def run(arguments: Sequence[str]) -> None:
     """
     asked = parse(Options, "contactsafe run", arguments, description=docstring(run))
     asked.check()
+    looks = looks_of(asked)
     described = task_by_name(task_of(arguments))
     if described.robot is None:
         raise InvalidInputError(f"task '{described.name}' says nothing of real robots; see docs/howto/own_task.md")
     bundle = load_bundle(asked.policy, described.name)
     task = described.robot()
-    arm = robots.fr3(task.tool)
+    arm = ARMS[asked.arm][0](task.tool)
     if asked.calibration is not None:
         arm = robots.calibrated(arm, asked.calibration)
     asked.out.mkdir(parents=True, exist_ok=True)
     if not asked.simulated:
         from contactsafe.cli.real_robot import run_real
 
-        run_real(asked, task, arm, bundle)
+        run_real(asked, task.work(**looks), arm, bundle)
         return
     names = [asked.controller] + ([] if asked.against == "none" else [asked.against])
-    runs = [_simulated(asked, task, arm, bundle.folder, name) for name in dict.fromkeys(names)]
+    runs = [_simulated(asked, task, arm, bundle.folder, name, looks) for name in dict.fromkeys(names)]
     _show(asked, runs, shlex.join(["contactsafe", "run", *arguments]))
 
 
-def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str) -> RobotRun:
+def looks_of(asked: Options) -> dict[str, Any]:
+    """Return what the task looks with.
+
+    Raises:
+        InvalidInputError: the file is no calibration of a camera.
+    """
+    looks: dict[str, Any] = {"camera": asked.camera}
+    if asked.camera_calibration is not None:
+        from contactsafe.vision.camera_calibration import CameraCalibration
+
+        looks["camera_calibration"] = CameraCalibration.load(asked.camera_calibration)
+    return looks
+
+
+def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: str, looks: dict[str, Any]) -> RobotRun:
     """Run once against the simulated robot."""
     folder = asked.out / controller.replace(":", "-")
     folder.mkdir(parents=True, exist_ok=True)
     exchange = Exchange.create(arm.n)
     exchange.status["lockstep"] = asked.lockstep
-    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone)
+    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone, **looks)
     robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
     try:
         with robot:
@@ -170,8 +201,9 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
 
 def said_of(asked: Options, controller: str) -> dict[str, str]:
     """Return what a log says of its run: all that is needed to compute its torques again."""
-    calibrated = {} if asked.calibration is None else {"calibration": str(asked.calibration.resolve())}
-    return {"robot": "fr3", "task": asked.task, "controller": controller, **calibrated}
+    files = {"calibration": asked.calibration, "camera_calibration": asked.camera_calibration}
+    calibrated = {name: str(path.resolve()) for name, path in files.items() if path is not None}
+    return {"robot": asked.arm, "task": asked.task, "controller": controller, **calibrated}
 
 
 def parts_of(
@@ -179,7 +211,7 @@ def parts_of(
 ) -> list[Part]:
     """Return the processes of a run."""
     rights = Realtime(0 if asked.lockstep else asked.priority)
-    port = FrankaPort(address, load_of(arm))
+    port = ARMS[asked.arm][1](address, load_of(arm))
     settings = ControlSettings(arm, presets.by_name(controller), port, asked.lockstep, rights)
     rounds = asked.rounds if asked.simulated else 0
     policy = PolicySettings(arm, bundle, work, asked.speed, asked.lockstep, rounds)
@@ -220,7 +252,11 @@ class StatusLine(Unique):
         self._last = now
         state = STATES[int(status["state"])]
         reason = f" ({REASONS[int(status['reason'])].name})" if status["reason"] else ""
-        contact = f"link {status['contact_link']} {status['contact_nm']:.0f} N m" if status["contact_link"] else "none"
+        contact = (
+            f"link {status['contact_link']} {status['contact_n']:.0f} N, {status['contact_nm']:.0f} N m"
+            if status["contact_link"]
+            else "none"
+        )
         counts = np.cumsum(status["busy"])
         busy = int(np.searchsorted(counts, 0.99 * counts[-1])) if counts[-1] else 0
         line = (

@@ -9,7 +9,6 @@ from contactsafe.control.config import ControllerConfig, damping_rate
 from contactsafe.control.damping import GAIN_MARGIN
 from contactsafe.control.estimation import estimate_at
 from contactsafe.control.instance import Instance, checked_config
-from contactsafe.control.places import Place, places_of
 from contactsafe.control.presets import safe
 from contactsafe.control.signals import Contact, Measurement, contact_of
 from contactsafe.core.errors import InvalidInputError
@@ -86,23 +85,7 @@ class ContactEstimator(Instance):
         if self.record["state"]["clock"]["braking"]:
             self._begin_anew(measurement)
         self._drive(sent, measurement.torque is not None)
-        return contact_of(self._reported, placed=True)
-
-    def places(self, fraction: float = 0.95) -> list[Place]:
-        """Return where the present contact may be: the places that together have a fraction of the probability.
-
-        Joint torques alone cannot tell some places apart; the set shrinks as the arm moves on in contact.
-
-        Args:
-            fraction: of the probability, 0 … 1.
-
-        Returns:
-            Likeliest first; empty where nothing shows in the joints.
-
-        Raises:
-            InvalidInputError: that is no fraction.
-        """
-        return places_of(self._ticked, self._index, fraction)
+        return contact_of(self._reported)
 
     @property
     def fault(self) -> str:

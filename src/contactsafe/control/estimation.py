@@ -9,7 +9,7 @@ import numpy as np
 
 from contactsafe.control.classification import contact_kind
 from contactsafe.control.clock import narrow_band, receive, set_step
-from contactsafe.control.codes import BAD_MEASUREMENT, FREE, LOAD, RUNAWAY
+from contactsafe.control.codes import BAD_MEASUREMENT, FREE, LOAD, RUNAWAY, TOOL
 from contactsafe.control.contact_work import is_active
 from contactsafe.control.detection import set_thresholds
 from contactsafe.control.laws import line_of_action_misses_tool, task_inertia
@@ -92,7 +92,7 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     """Estimate what touches the arm, from residual to mode, and masses, over the time since the last measurement."""
     state, params, dynamics, observer = c.state, c.params, c.dynamics, c.state.observer
     detection, masses, tool = state.detection, state.link_masses, state.tool_wrench
-    untouched = state.mode == FREE and state.touch.touching == 0 and detection.quiet_ticks > 0
+    untouched = state.mode == FREE and state.touch.withholds == 0 and detection.quiet_ticks > 0
     _set_time(state, params, untouched)
     went_on = observe(observer, state.arm, state.clock, state.step, state.command, dynamics, params)
     if state.clock.bridged > 0:
@@ -146,7 +146,7 @@ def _is_tool_free(state: Record, params: Record) -> bool:
 def _identify(c: Record) -> None:
     """Identify link masses from one joint's residual, while nothing touches the arm."""
     state, params, observer, dynamics = c.state, c.params, c.state.observer, c.dynamics
-    i, untouched = state.turn, state.mode == FREE and state.touch.touching == 0 and state.detection.quiet_ticks > 0
+    i, untouched = state.turn, state.mode == FREE and state.touch.withholds == 0 and state.detection.quiet_ticks > 0
     identify_link_masses(
         state.link_masses, i, observer.residual[i], state.detection.model_uncertainty[i], dynamics.mass_regressor[i],
         state.step.dt, untouched and state.arm.has_wrench != 0, params.identification.mass_variance,
@@ -208,17 +208,24 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
         c.state.tool_wrench, c.state.arm, c.state.mode, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain
     )
     follow_touch(c)
-    _report_touch(c.state, c.output)
+    c.state.touch.withholds = c.state.touch.touching
+    c.output.kind = c.state.touch.kind
+    report_touch(c.state, c.output)
 
 
 @inlined
-def _report_touch(state: Record, out: Record) -> None:
-    """Report what touches arm or tool, and where."""
+def report_touch(state: Record, out: Record) -> None:
+    """Report where arm or tool is touched, with what force, and how probable it is the one that was reported.
+
+    Args:
+        out: `output_dtype` record, its kind set.
+    """
     touch, place = state.touch, state.localisation
-    out.kind, out.probability = touch.kind, touch.probability
-    out.several = 1 if touch.touching != 0 and place.left_over > 1.0 else 0
-    if touch.touching != 0 and place.best >= 0:
-        out.link = min(place.link, state.arm.q.shape[0])
-        out.point[:], out.force[:] = place.point, place.force
-    else:
-        out.point[:], out.force[:] = math.nan, 0.0
+    out.probability, out.several, out.touched = 1.0, 0, 0
+    out.point[:], out.force[:] = math.nan, 0.0
+    if touch.touching == 0 or place.best < 0:
+        return
+    out.probability = place.tool_probability if out.kind == TOOL else 1.0 - place.tool_probability
+    out.several = 1 if place.left_over > 1.0 else 0
+    out.touched = min(place.link, state.arm.q.shape[0])
+    out.point[:], out.force[:] = place.point, place.force

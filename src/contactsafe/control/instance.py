@@ -7,6 +7,7 @@ import numpy as np
 from contactsafe.control.checks import checked_slot, seconds, shaped
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.params import fill_params
+from contactsafe.control.places import Place, places_of
 from contactsafe.control.presets import safe
 from contactsafe.control.records import controller_dtype
 from contactsafe.control.signals import Measurement
@@ -50,6 +51,23 @@ class Instance(Independent):
         """Clear what was measured, remembered and reported."""
         for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
+        self.record["output"]["point"] = np.nan
+
+    def places(self, fraction: float = 0.95) -> list[Place]:
+        """Return where the present contact may be: the places that together have a fraction of the probability.
+
+        Joint torques alone cannot tell some places apart; the set shrinks as the arm moves on in contact.
+
+        Args:
+            fraction: of the probability, 0 … 1.
+
+        Returns:
+            Likeliest first; empty where nothing shows in the joints.
+
+        Raises:
+            InvalidInputError: that is no fraction.
+        """
+        return places_of(self._ticked, self._index, fraction)
 
     def require_reset(self, measurement: Measurement) -> None:
         """Refuse what is no measurement, and one that comes before a reset.

@@ -129,7 +129,8 @@ def output_dtype(n: int) -> np.dtype:
             ("velocity", _f, (6,)),  # of the tool
             ("mode", _i),  # FREE, COMPLY or REJECT
             ("kind", _i),  # key of KINDS
-            ("link", _i),  # 1 … n, 0 for none
+            ("link", _i),  # that the law in force complies with or rejects a contact of, 1 … n, 0 for none
+            ("touched", _i),  # link, most probably, that the point is on, 1 … n, 0 where there is none
             ("probability", _f),  # of the kind
             ("several", _i),  # whether no single contact explains the torques
             *(
@@ -180,4 +181,5 @@ def index_bounds(controller: np.void) -> dict[str, tuple[float, float]]:
         "output.mode": (FREE, REJECT),
         "output.kind": (NO_CONTACT, TOOL),
         "output.link": (0, n),
+        "output.touched": (0, n),
     }

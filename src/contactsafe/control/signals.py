@@ -1,6 +1,5 @@
 """What goes into a step of the controller, and what comes out."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -57,14 +56,13 @@ class Contact(NamedTuple):
             obstacle until receding from it has shown that it pushes; 'tool' where the tool alone touches something;
             'none'.
         torque: estimated joint torque of the contact, (n,), N m (the fast residual).
-        probability: of the kind's being right as to arm or tool; like point and force by `ContactEstimator` alone, NaN
-            by the controller.
+        probability: of the kind's being right as to arm or tool, as far as joint torques tell.
         point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints.
             `ContactEstimator.places()` gives the others that explain the torques.
         force: of the environment there, as far as joint torques tell it, world, (3,), N.
         bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
-        several: whether no single contact explains the torques, so that arm or tool is touched in two places at least;
-            by `ContactEstimator` alone. Two contacts often do look like one: no is no proof.
+        several: whether no single contact explains the torques, so that arm or tool is touched in two places at least.
+            Two contacts often do look like one: no is no proof.
     """
 
     in_contact: bool
@@ -115,23 +113,18 @@ class Output(NamedTuple):
 _LIMITED_BY = [tuple(name for key, name in LIMITS.items() if sum_ & key) for sum_ in range(2 * max(LIMITS))]
 
 
-def contact_of(out: dict[str, np.ndarray], placed: bool) -> Contact:
-    """Return what a tick reports of a contact, from the fields of an `output_dtype` record.
-
-    Args:
-        out: the fields.
-        placed: whether the contact's place was looked for, as the estimator does and the controller does not.
-    """
+def contact_of(out: dict[str, np.ndarray]) -> Contact:
+    """Return what a tick reports of a contact, from the fields of an `output_dtype` record."""
     return Contact(
         in_contact=bool(out["mode"] != FREE),
-        link=int(out["link"]),
+        link=int(out["touched"]) or int(out["link"]),
         kind=KINDS[int(out["kind"])],
         torque=out["residual_fast"].copy(),
-        probability=float(out["probability"]) if placed else math.nan,
-        point=out["point"].copy() if placed else np.full(3, np.nan),
-        force=out["force"].copy() if placed else np.full(3, np.nan),
+        probability=float(out["probability"]),
+        point=out["point"].copy(),
+        force=out["force"].copy(),
         bridged=int(out["bridged"]),
-        several=placed and bool(out["several"]),
+        several=bool(out["several"]),
     )
 
 
@@ -139,7 +132,7 @@ def output_of(out: dict[str, np.ndarray]) -> Output:
     """Return what a tick reports, from the fields of an `output_dtype` record."""
     return Output(
         torque=out["torque"].copy(),
-        contact=contact_of(out, placed=False),
+        contact=contact_of(out),
         residual=out["residual"].copy(),
         error=out["error"].copy(),
         limited_by=_LIMITED_BY[int(out["limited_by"])],

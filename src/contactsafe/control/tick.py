@@ -17,7 +17,14 @@ from contactsafe.control.codes import (
     MISSING,
     NO_TORQUE,
 )
-from contactsafe.control.estimation import estimate, follow_arm, latch, report_arm, start_estimation
+from contactsafe.control.estimation import (
+    estimate,
+    follow_arm,
+    latch,
+    report_arm,
+    report_touch,
+    start_estimation,
+)
 from contactsafe.control.impedance import (
     compose_into,
     follow_gains,
@@ -31,6 +38,7 @@ from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.stopping import stop_late_target, stop_torque
 from contactsafe.control.target import accept_target
 from contactsafe.control.tool_wrench import follow_tool_force
+from contactsafe.control.touch import follow_touch
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matmul
@@ -64,6 +72,7 @@ def control_tick(c: Record) -> None:
     if state.clock.braking != 0:
         tau = stop_torque(state.clock, state.arm, dynamics.M)
     _send(c, tau)
+    _feel(c)
 
 
 @compiled(nogil=True)
@@ -162,6 +171,16 @@ def _contact_law(
         rate = c.params.limits.braking_rate - impedance.task_damping
         reaction.damp_approach(tau, direction, qd, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping)
     return tau
+
+
+@inlined
+def _feel(c: Record) -> None:
+    """Find where arm or tool is touched, and report it; no torque of this tick needs it."""
+    if c.state.clock.bridged > 0:
+        return
+    if c.params.reaction.contact_aware != 0:
+        follow_touch(c)
+    report_touch(c.state, c.output)
 
 
 @inlined

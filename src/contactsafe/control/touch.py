@@ -35,10 +35,10 @@ def touch_dtype(n: int) -> np.dtype:
     return np.dtype(
         [
             ("touching", _i),
+            ("withholds", _i),  # nothing is learnt meanwhile: of an estimator; in a controller the mode decides that
             ("ticks", _i),  # since it began or ended
             ("quiet_ticks", _i),  # since the residual was above what keeps a contact
             ("kind", _i),  # key of KINDS
-            ("probability", _f),  # of it
             ("torque", _f, (n,)),  # fast residual less its baseline, N m
             ("sigma", _f, (n,)),  # its standard deviation, N m
         ]
@@ -70,7 +70,7 @@ def follow_touch(c: Record) -> None:
             place, c.handle, touch.torque, known, state.arm.q, state.baseline.weight,
             _tool_prior(state, params.observer), state.step.dt,
         )  # fmt: skip
-    touch.kind, touch.probability = _kind(touch, place, state, params.classification.tool_contact_n)
+    touch.kind = _kind(touch, place, state, params.classification.tool_contact_n)
 
 
 @inlined
@@ -91,7 +91,7 @@ def follow_change(c: Record) -> None:
     """
     state = c.state
     observer, detection, touch, baseline = state.observer, state.detection, state.touch, state.baseline
-    untouched = touch.touching == 0 and state.mode == FREE
+    untouched = touch.withholds == 0 and state.mode == FREE
     follow_baseline(baseline, observer.residual_fast, state.arm.q, untouched, state.step.dt)
     for i in range(touch.torque.shape[0]):
         changed = observer.residual_fast[i] - baseline.weight * baseline.residual[i]
@@ -119,12 +119,12 @@ def _shows(c: Record) -> bool:
 
 
 @inlined
-def _kind(touch: Record, place: Record, state: Record, pressed: float) -> tuple[int, float]:
-    """Return what touches, a key of KINDS, and how probable that is. A contact of the arm comes before the tool's."""
+def _kind(touch: Record, place: Record, state: Record, pressed: float) -> int:
+    """Return what touches, a key of KINDS. A contact of the arm comes before the tool's."""
     force = state.tool_wrench.force
     if touch.touching == 0:
         on_tool = state.arm.has_wrench != 0 and dot(force, force) >= pressed * pressed
-        return (TOOL if on_tool else NO_CONTACT), 1.0
+        return TOOL if on_tool else NO_CONTACT
     if place.tool_probability > 0.5:
-        return TOOL, place.tool_probability
-    return (PUSH if state.mode == REJECT else OBSTACLE), 1.0 - place.tool_probability
+        return TOOL
+    return PUSH if state.mode == REJECT else OBSTACLE

@@ -14,7 +14,7 @@ from contactsafe.experiments.config import Entry, ExperimentConfig, Progress
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.metrics import ZERO, Aim, Metric
 from contactsafe.robot.arm import Arm
-from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.sim.config import REAL_SENSORS, SensorConfig, WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
@@ -56,18 +56,24 @@ def adversarial(config: ExperimentConfig, progress: Progress | None = None) -> E
     trials: list[Trial] = []
     for name in config.controllers:
         for seeds in config.batches():
-            metrics = run_adversarial(arm, presets.by_name(name), seeds)
+            metrics = run_adversarial(arm, presets.by_name(name), seeds, sensors=config.real_sensors)
             trials += [Trial("adversarial targets", name, seed, row) for seed, row in zip(seeds, metrics, strict=True)]
             if progress:
                 progress(len(seeds))
     return Experiment(NAME, "Adversarial targets", QUESTION, tuple(trials), METRICS)
 
 
-ENTRY = Entry(NAME, "targets that ask for the impossible: are all limits kept?", adversarial, trials=100)
+ENTRY = Entry(
+    NAME, "targets that ask for the impossible: are all limits kept?", adversarial, trials=100, takes=("sensors",)
+)
 
 
 def run_adversarial(
-    arm: Arm, controller: ControllerConfig, seeds: Sequence[int], ticks: int = TICKS
+    arm: Arm,
+    controller: ControllerConfig,
+    seeds: Sequence[int],
+    ticks: int = TICKS,
+    sensors: SensorConfig = REAL_SENSORS,
 ) -> list[dict[str, float]]:
     """Drive one arm for each seed by adversarial targets.
 
@@ -75,7 +81,7 @@ def run_adversarial(
         For each, its metrics; see `limit_metrics`.
     """
     rngs = [scene_rng(seed, 2) for seed in seeds]
-    worlds = Worlds(arm, [_world(arm, rng) for rng in rngs], controller, len(seeds), list(seeds))
+    worlds = Worlds(arm, [_world(arm, rng, sensors) for rng in rngs], controller, len(seeds), list(seeds))
     for i in range(len(seeds)):
         worlds.reset(i, arm.home)
     trace = np.zeros((len(seeds), MAX_TICKS), dtype=trace_dtype(arm.n))
@@ -91,9 +97,9 @@ def run_adversarial(
     return [limit_metrics(traces[i], arm, controller) for i in range(len(seeds))]
 
 
-def _world(arm: Arm, rng: np.random.Generator) -> WorldConfig:
+def _world(arm: Arm, rng: np.random.Generator, sensors: SensorConfig) -> WorldConfig:
     things = tuple(_thing(rng) for _ in range(_THINGS))
-    return WorldConfig(plant=sample_plant(rng, arm.n), sensors=REAL_SENSORS, obstacles=things)
+    return WorldConfig(plant=sample_plant(rng, arm.n), sensors=sensors, obstacles=things)
 
 
 def _thing(rng: np.random.Generator) -> Obstacle:

@@ -18,6 +18,7 @@ from contactsafe.experiments.late_worlds import SEEN, LatePlayback, LateWorlds
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.metrics import CONTACT_N, ZERO, Aim, Metric
 from contactsafe.robot.arm import Arm
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.worlds import MAX_TICKS
 
 NAME = "clock"
@@ -104,7 +105,7 @@ def _run(
         for row, scene in zip(codes, scenes, strict=True):
             row[:ticks] = case.codes(ticks, scene.at, scene_rng(scene.seed, 3))
     silent = [(scene.at, scene.at + round(1000 * case.silent_s) if case else 0) for scene in scenes]
-    configs = [scene.motion.world(scene.obstacles, True) for scene in scenes]
+    configs = [scene.motion.world(scene.obstacles, REAL_SENSORS) for scene in scenes]
     worlds = LateWorlds(arm, configs, controller, [scene.seed for scene in scenes], codes, timed)
     trace = LatePlayback(worlds, [scene.motion for scene in scenes], ticks, silent).record()
     faults = worlds.controllers["state"]["fault"].tolist()

@@ -19,6 +19,7 @@ from contactsafe.experiments.late_worlds import (
 )
 from contactsafe.experiments.motions import record
 from contactsafe.robot.arm import Arm
+from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.worlds import Worlds
 
@@ -120,7 +121,7 @@ def sample_scene(arm: Arm, situation: str, seed: int) -> Scene:
     at = round(1000 * motion.meets_s)
     if situation != "in contact":
         return Scene(motion, (), seed, at)
-    worlds = Worlds(arm, motion.world((), True), presets.vices(), 1, [seed])
+    worlds = Worlds(arm, motion.world((), REAL_SENSORS), presets.vices(), 1, [seed])
     free = record(worlds, [motion])[0]
     worlds.close()
     met = tuple(meeting.obstacle for meeting in sample_meetings(arm, motion, free["q"]))

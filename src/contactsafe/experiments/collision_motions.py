@@ -14,7 +14,7 @@ from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.policy.action import DOWN
 from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
-from contactsafe.sim.config import REAL_SENSORS, PlantConfig, WorldConfig
+from contactsafe.sim.config import PlantConfig, SensorConfig, WorldConfig
 from contactsafe.sim.fixtures import workbench
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.tasks.base.evaluation import HELD_OUT_SEED
@@ -90,10 +90,10 @@ class Motion:
         fraction = min(max((time_s - 0.2) * self.speed_m_s / self.length_m, 0.0), 1.0)
         return self.start.position + fraction * self.path
 
-    def world(self, obstacles: tuple[Obstacle, ...], real: bool) -> WorldConfig:
-        """Return the world to run it in, with the plant and sensors as they are or as the controller believes."""
-        if real:
-            return WorldConfig(plant=self.plant, sensors=REAL_SENSORS, obstacles=obstacles)
+    def world(self, obstacles: tuple[Obstacle, ...], sensors: SensorConfig | None) -> WorldConfig:
+        """Return the world to run it in, with its plant and these sensors; None for both as the controller believes."""
+        if sensors is not None:
+            return WorldConfig(plant=self.plant, sensors=sensors, obstacles=obstacles)
         return WorldConfig(obstacles=obstacles)
 
 

@@ -13,14 +13,22 @@ from contactsafe.experiments.again import run_again
 from contactsafe.experiments.collision_metrics import METRICS, collision_metrics, describe, scene_metrics
 from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.collision_scenes import Meeting, sample_meetings
-from contactsafe.experiments.config import BATCH, PLANTS, Entry, ExperimentConfig, Progress
+from contactsafe.experiments.config import (
+    BATCH,
+    PLANTS,
+    Entry,
+    ExperimentConfig,
+    Progress,
+)
 from contactsafe.experiments.motions import record
+from contactsafe.experiments.sensors import USUAL, require_sensors, sensors_words
 from contactsafe.experiments.verdict_tables import verdict_table, worst_tables
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, length, scalar
 from contactsafe.results.recording import Recording
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, require_arm
+from contactsafe.sim.config import SENSORS, SensorConfig
 from contactsafe.sim.worlds import Worlds
 
 NAME = "collisions"
@@ -48,7 +56,7 @@ def collisions(config: ExperimentConfig, progress: Progress | None = None) -> Ex
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    return run_battery(controllers, config.seeds, config.plants, progress, config.arm, config.arm_words)
+    return run_battery(controllers, config.seeds, config.plants, progress, config.arm, config.arm_words, config.sensors)
 
 
 ENTRY = Entry(
@@ -57,7 +65,7 @@ ENTRY = Entry(
     collisions,
     count=lambda config: config.count(len(config.plants)),
     trials=100,
-    takes=("plants",),
+    takes=("plants", "sensors"),
 )
 
 
@@ -68,6 +76,7 @@ def run_battery(
     progress: Progress | None = None,
     arm: Arm | None = None,
     arm_words: Sequence[str] | None = None,
+    sensors: str = USUAL,
 ) -> Experiment:
     """Put controllers through the same collisions. A seed's trial does not depend on the others.
 
@@ -78,6 +87,7 @@ def run_battery(
         progress: told how many trials were just done.
         arm: that collides; None for a Panda.
         arm_words: what names it on the command line; None where nothing does.
+        sensors: of the real plant, one of `SENSORS`.
 
     Returns:
         A trial for each seed, plant and controller, recordings of the first seed, tables of the comparison and of the
@@ -91,6 +101,7 @@ def run_battery(
             f"{len(controllers)} controllers, {len(seeds)} seeds, plants {', '.join(plants)}; "
             f"give one or more of each, plants from {', '.join(PLANTS)}"
         )
+    known = SENSORS[require_sensors(sensors)]
     usual = robots.panda()
     arm = usual if arm is None else require_arm(arm)
     batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
@@ -99,14 +110,16 @@ def run_battery(
     try:
         done = list(
             pool.map(
-                lambda batch: _run_batch(arm, batch, controllers, plants, progress, recorded=batch is batches[0]),
+                lambda batch: _run_batch(arm, batch, controllers, plants, known, progress, batch is batches[0]),
                 batches,
             )
         )
     finally:
         pool.shutdown(cancel_futures=True)
     trials = tuple(trial for of_batch, _ in done for trial in of_batch)
-    again = run_again("run_battery", _words(controllers, plants), controllers, (arm, usual), arm_words)
+    again = run_again(
+        "run_battery", [*_words(controllers, plants), *sensors_words(sensors)], controllers, (arm, usual), arm_words
+    )
     tables = (verdict_table(trials), *worst_tables(trials, again))
     return Experiment(
         NAME, "Collisions", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,), tables=tables
@@ -118,11 +131,12 @@ def _run_batch(
     seeds: Sequence[int],
     controllers: Mapping[str, ControllerConfig],
     plants: Sequence[str],
+    sensors: SensorConfig,
     progress: Progress | None,
     recorded: bool,
 ) -> tuple[list[Trial], list[Recording]]:
     """Return the trials of some seeds, and recordings of the first of them where wanted."""
-    batch = _Batch(arm, seeds)
+    batch = _Batch(arm, seeds, sensors)
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for plant in plants:
@@ -147,10 +161,11 @@ class _Batch:
     Args:
         arm: built from a description.
         seeds: of the scenes.
+        sensors: of the real plant.
     """
 
-    def __init__(self, arm: Arm, seeds: Sequence[int]):
-        self.arm, self.seeds = arm, seeds
+    def __init__(self, arm: Arm, seeds: Sequence[int], sensors: SensorConfig):
+        self.arm, self.seeds, self.sensors = arm, seeds, sensors
         self.motions = [sample_motion(arm, seed) for seed in seeds]
         nothing: list[tuple[Meeting, ...]] = [()] * len(seeds)
         worlds = self._worlds(nothing, presets.vices(), "real")
@@ -193,7 +208,7 @@ class _Batch:
         self, meetings: Sequence[tuple[Meeting, ...]], controller: ControllerConfig | None, plant: str
     ) -> Worlds:
         configs = [
-            motion.world(tuple(meeting.obstacle for meeting in met), plant == "real")
+            motion.world(tuple(meeting.obstacle for meeting in met), self.sensors if plant == "real" else None)
             for motion, met in zip(self.motions, meetings, strict=True)
         ]
         return Worlds(self.arm, configs, controller, len(configs), self.seeds)

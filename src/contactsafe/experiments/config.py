@@ -7,11 +7,13 @@ from typing import Literal
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.experiments.sensors import USUAL, require_sensors
 from contactsafe.experiments.task import ExperimentTask
 from contactsafe.policy.bundle import Bundle
 from contactsafe.results.experiment import Experiment
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, require_arm
+from contactsafe.sim.config import SENSORS, SensorConfig
 
 BATCH = 16
 """Most trials stepped together: bounds the memory that their traces take."""
@@ -22,7 +24,7 @@ PLANTS = ("real", "clean")
 Progress = Callable[[int], object]
 """Told how many trials were just done."""
 
-Taken = Literal["task", "bundle", "plants", "minutes"]
+Taken = Literal["task", "bundle", "plants", "sensors", "minutes"]
 """A field of `ExperimentConfig`, and an option of the command line, that not every experiment takes."""
 
 
@@ -35,6 +37,8 @@ class ExperimentConfig:
         trials: seeds tried, seed, seed + 1, …
         seed: first seed.
         plants: some of `PLANTS`, for collisions.
+        sensors: of an arm that has errors, one of `SENSORS`: 19-bit encoders alone, or a Franka's torque sensors and
+            its velocity with more noise.
         minutes: simulated time in which detection counts false alarms, min.
         task: for experiments that run one.
         bundle: policy, for experiments that run one.
@@ -46,6 +50,7 @@ class ExperimentConfig:
     trials: int = 10
     seed: int = 0
     plants: tuple[str, ...] = PLANTS
+    sensors: str = USUAL
     minutes: float = 60.0
     task: ExperimentTask | None = None
     bundle: Bundle | None = None
@@ -67,8 +72,14 @@ class ExperimentConfig:
             raise InvalidInputError(f"seed = {self.seed}; give 0 or more")
         if not self.plants or not set(self.plants) <= set(PLANTS):
             raise InvalidInputError(f"plants = {','.join(self.plants)}; choose from {', '.join(PLANTS)}")
+        require_sensors(self.sensors)
         if not 0 < self.minutes < math.inf:
             raise InvalidInputError(f"minutes = {self.minutes:g}; give a number greater than 0")
+
+    @property
+    def real_sensors(self) -> SensorConfig:
+        """What an arm that has errors is measured by."""
+        return SENSORS[self.sensors]
 
     @property
     def seeds(self) -> range:

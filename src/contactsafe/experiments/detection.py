@@ -52,12 +52,14 @@ def detection(config: ExperimentConfig, progress: Progress | None = None) -> Exp
     for name, controller in reporting(config.controllers).items():
         for first in range(0, len(seeds), _BATCH):
             for scenario in (STEP, CONTACT):
-                trials += push_trials(arm, name, controller, seeds[first : first + _BATCH], scenario)
+                trials += push_trials(
+                    arm, name, controller, seeds[first : first + _BATCH], scenario, config.real_sensors
+                )
                 if progress:
                     progress(len(seeds[first : first + _BATCH]))
         strokes = sample_strokes(arm, config.seed, _stroke_worlds(config.minutes))
         for first in range(0, len(strokes), _BATCH):
-            trials += false_alarm_trials(arm, name, controller, strokes[first : first + _BATCH])
+            trials += false_alarm_trials(arm, name, controller, strokes[first : first + _BATCH], config.real_sensors)
             if progress:
                 progress(len(strokes[first : first + _BATCH]))
     return Experiment(NAME, "Detection", QUESTION, tuple(trials), METRICS, tables=detection_tables(arm, trials))
@@ -87,7 +89,7 @@ ENTRY = Entry(
     detection,
     count=count,
     trials=100,
-    takes=("minutes",),
+    takes=("sensors", "minutes"),
 )
 
 

@@ -14,7 +14,7 @@ from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, component
 from contactsafe.results.metrics import Aim, Highlight, Metric
 from contactsafe.results.recording import Recording
-from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.sim.config import SensorConfig, WorldConfig
 
 NAME = "disturbance"
 QUESTION = (
@@ -67,9 +67,9 @@ def disturbance(config: ExperimentConfig, progress: Progress | None = None) -> E
     for mode in modes(task):
         for name in config.controllers:
             for seeds in config.batches():
-                calm = _run(task, mode, name, seeds, None)
+                calm = _run(task, mode, name, seeds, None, config.real_sensors)
                 for link in PUSH_POINTS:
-                    pushed = _run(task, mode, name, seeds, link)
+                    pushed = _run(task, mode, name, seeds, link, config.real_sensors)
                     scenario = f"push on link {link} while {mode}"
                     for i, seed in enumerate(seeds):
                         metrics = deviation_metrics(pushed.traces[i], calm.traces[i])
@@ -96,7 +96,7 @@ ENTRY = Entry(
     "somebody leans on the arm with 25 N.",
     disturbance,
     count=lambda config: config.count(2 * len(PUSH_POINTS)),
-    takes=("task",),
+    takes=("task", "sensors"),
 )
 
 
@@ -111,9 +111,11 @@ def push_force(seed: int, link: int) -> np.ndarray:
     return PUSH_N * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def _run(task: ExperimentTask, mode: str, controller: str, seeds: Sequence[int], link: int | None) -> Run:
+def _run(
+    task: ExperimentTask, mode: str, controller: str, seeds: Sequence[int], link: int | None, sensors: SensorConfig
+) -> Run:
     n = task.arm.n
-    worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), n), sensors=REAL_SENSORS) for seed in seeds]
+    worlds = [WorldConfig(plant=sample_plant(scene_rng(seed, 0), n), sensors=sensors) for seed in seeds]
     episodes, act = task.scripted(controller, seeds, worlds, STIFFNESS, works=mode == task.name)
     if link is not None:
         for i, seed in enumerate(seeds):

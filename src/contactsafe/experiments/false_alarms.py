@@ -12,6 +12,7 @@ from contactsafe.experiments.collision_motions import Motion, sample_motion
 from contactsafe.experiments.motions import Playback
 from contactsafe.results.experiment import Trial
 from contactsafe.robot.arm import Arm
+from contactsafe.sim.config import REAL_SENSORS, SensorConfig
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
@@ -48,13 +49,19 @@ def sample_strokes(arm: Arm, seed: int, n: int) -> list[Strokes]:
     return found
 
 
-def false_alarm_trials(arm: Arm, name: str, controller: ControllerConfig, strokes: Sequence[Strokes]) -> list[Trial]:
+def false_alarm_trials(
+    arm: Arm,
+    name: str,
+    controller: ControllerConfig,
+    strokes: Sequence[Strokes],
+    sensors: SensorConfig = REAL_SENSORS,
+) -> list[Trial]:
     """Count entries into contact mode where nothing touches the arm.
 
     A world is watched until its end, or until the arm truly bears more than 0.5 N m, such as from the table.
     """
     n, seeds = len(strokes), [stroke.seed for stroke in strokes]
-    worlds = Worlds(arm, [stroke.world((), real=True) for stroke in strokes], controller, n, seeds)
+    worlds = Worlds(arm, [stroke.world((), sensors) for stroke in strokes], controller, n, seeds)
     play, steps = Playback(worlds, strokes), np.zeros((n, MAX_TICKS), dtype=trace_dtype(arm.n))
     before, untouched = np.zeros((n, 1), int), np.ones(n, bool)
     entries, lasting, watched = np.zeros(n), np.zeros(n), np.zeros(n)

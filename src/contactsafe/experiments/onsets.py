@@ -15,6 +15,7 @@ from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.results.experiment import Trial
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.shape import link_frames
+from contactsafe.sim.config import REAL_SENSORS, SensorConfig
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import MAX_TICKS, Worlds
 
@@ -63,6 +64,7 @@ def sample_push(arm: Arm, q: np.ndarray, rng: np.random.Generator, scenario: str
         q: its joint positions, (n,), rad.
         rng: of the sample.
         scenario: `STEP` or `CONTACT`.
+        sensors: of the arm.
     """
     origins, rotations = link_frames(description_and_tool(arm)[0], q[None])
     while True:
@@ -96,7 +98,14 @@ def point_torque(
     return torque
 
 
-def push_trials(arm: Arm, name: str, controller: ControllerConfig, seeds: Sequence[int], scenario: str) -> list[Trial]:
+def push_trials(
+    arm: Arm,
+    name: str,
+    controller: ControllerConfig,
+    seeds: Sequence[int],
+    scenario: str,
+    sensors: SensorConfig = REAL_SENSORS,
+) -> list[Trial]:
     """Push the arm once in each scene, while it moves, and see when and where a contact is reported.
 
     Args:
@@ -105,11 +114,12 @@ def push_trials(arm: Arm, name: str, controller: ControllerConfig, seeds: Sequen
         controller: that reports contacts.
         seeds: of the scenes.
         scenario: `STEP` or `CONTACT`.
+        sensors: of the arm.
     """
     motions = [sample_motion(arm, seed) for seed in seeds]
     rngs = [scene_rng(seed, 2 if scenario == STEP else 3) for seed in seeds]
     onsets = [round(POLICY_RATE_HZ * rng.uniform(0.3, m.meets_s)) for rng, m in zip(rngs, motions, strict=True)]
-    worlds = Worlds(arm, [motion.world((), real=True) for motion in motions], controller, len(motions), seeds)
+    worlds = Worlds(arm, [motion.world((), sensors) for motion in motions], controller, len(motions), seeds)
     play, steps = Playback(worlds, motions), np.zeros((len(motions), MAX_TICKS), dtype=trace_dtype(arm.n))
     pushes: dict[int, Push] = {}
     pieces: list[list[np.ndarray]] = [[] for _ in motions]

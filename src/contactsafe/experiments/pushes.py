@@ -16,13 +16,14 @@ from contactsafe.experiments.motions import Playback, record_rest
 from contactsafe.experiments.push_metrics import METRICS, against, push_metrics
 from contactsafe.experiments.push_scenes import PushedMotion, sample_pushed_motion
 from contactsafe.experiments.push_tables import push_tables
+from contactsafe.experiments.sensors import USUAL, require_sensors, sensors_words
 from contactsafe.results.experiment import Experiment, Trial
 from contactsafe.results.figures import Figure, Panel, length, scalar
 from contactsafe.results.metrics import BASELINE
 from contactsafe.results.recording import Recording
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm, require_arm
-from contactsafe.sim.config import REAL_SENSORS, WorldConfig
+from contactsafe.sim.config import SENSORS, SensorConfig, WorldConfig
 from contactsafe.sim.worlds import Worlds
 
 NAME = "pushes"
@@ -53,7 +54,7 @@ def pushes(config: ExperimentConfig, progress: Progress | None = None) -> Experi
         progress: told of every trial done.
     """
     controllers = {name: presets.by_name(name) for name in config.controllers}
-    return run_pushes(controllers, config.seeds, progress, config.arm, config.arm_words)
+    return run_pushes(controllers, config.seeds, progress, config.arm, config.arm_words, config.sensors)
 
 
 ENTRY = Entry(
@@ -62,6 +63,7 @@ ENTRY = Entry(
     pushes,
     count=lambda config: config.count(2),
     trials=100,
+    takes=("sensors",),
 )
 
 
@@ -71,6 +73,7 @@ def run_pushes(
     progress: Progress | None = None,
     arm: Arm | None = None,
     arm_words: Sequence[str] | None = None,
+    sensors: str = USUAL,
 ) -> Experiment:
     """Give controllers the same pushes. A seed's trial does not depend on the others.
 
@@ -80,6 +83,7 @@ def run_pushes(
         progress: told how many trials were just done.
         arm: that is pushed; None for a Panda.
         arm_words: what names it on the command line; None where nothing does.
+        sensors: of the arm, one of `SENSORS`.
 
     Returns:
         Two trials for each seed and controller, with and without the wrist's wrench; recordings of the first seed;
@@ -90,17 +94,20 @@ def run_pushes(
     """
     if not controllers or not seeds:
         raise InvalidInputError(f"{len(controllers)} controllers, {len(seeds)} seeds; give one or more of each")
+    known = SENSORS[require_sensors(sensors)]
     usual = robots.panda()
     arm = usual if arm is None else require_arm(arm)
     batches = [seeds[start : start + BATCH] for start in range(0, len(seeds), BATCH)]
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
-        done = list(pool.map(lambda batch: _run_batch(arm, batch, controllers, progress, batch is batches[0]), batches))
+        done = list(
+            pool.map(lambda batch: _run_batch(arm, batch, controllers, known, progress, batch is batches[0]), batches)
+        )
     finally:
         pool.shutdown(cancel_futures=True)
     baseline = BASELINE if BASELINE in controllers else next(iter(controllers))
     trials = compared([trial for of_batch, _ in done for trial in of_batch], baseline)
-    words = [NAME, "--controllers", ",".join(controllers)]
+    words = [NAME, "--controllers", ",".join(controllers), *sensors_words(sensors)]
     again = run_again("run_pushes", words, controllers, (arm, usual), arm_words)
     return Experiment(
         NAME, "Pushes", QUESTION, trials, METRICS, recordings=tuple(done[0][1]), figures=(CURVES,),
@@ -112,6 +119,7 @@ def _run_batch(
     arm: Arm,
     seeds: Sequence[int],
     controllers: Mapping[str, ControllerConfig],
+    sensors: SensorConfig,
     progress: Progress | None,
     recorded: bool,
 ) -> tuple[list[Trial], list[Recording]]:
@@ -120,9 +128,9 @@ def _run_batch(
     trials: list[Trial] = []
     recordings: list[Recording] = []
     for scenario in (WITH_WRENCH, WITHOUT):
-        sensors = replace(REAL_SENSORS, wrist=scenario == WITH_WRENCH)
+        of_scenario = replace(sensors, wrist=scenario == WITH_WRENCH)
         worlds = Worlds(
-            arm, [WorldConfig(scene.plant, sensors, fixtures=()) for scene in scenes], None, len(scenes), seeds
+            arm, [WorldConfig(scene.plant, of_scenario, fixtures=()) for scene in scenes], None, len(scenes), seeds
         )
         for name, controller in controllers.items():
             worlds.use(controller)

@@ -17,6 +17,8 @@ on an arm (30 N m, and what an impact adds), short of what breaks the arm."""
 _RATE_NM = 1.0
 """A tick's change of torque that Franka's interface allows, N m: 1000 N m/s."""
 
+_SILENT = "UDP receive"  # in the message of a library that does not tell errors of the network from others
+
 _MISSING = "pylibfranka is not installed; install contactsafe[franka]"
 
 
@@ -39,7 +41,7 @@ class FrankaPort:
     """
 
     def __init__(self, address: str, load: tuple[float, np.ndarray, np.ndarray] | None = None):
-        _library()
+        _ = self._library
         self._address, self._load = address, load
         self._robot: Any = None
         self._control: Any = None
@@ -54,13 +56,23 @@ class FrankaPort:
 
     def connect(self) -> None:
         """Reach the robot; raise what it takes for a collision, tell it the load."""
-        with _named(self._library), realtime.kept():
-            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+        self.reach()
+        with _named(self._library):
             torques, forces = [COLLISION_NM] * 7, [COLLISION_N] * 6
             self._robot.set_collision_behavior(torques, torques, forces, forces)
             if self._load is not None:
                 mass, centre, inertia = self._load
                 self._robot.set_load(mass, list(centre), list(np.asarray(inertia).reshape(9, order="F")))
+
+    def recover(self) -> None:
+        """Acknowledge the error that stopped it; what needs Desk or the emergency stop is refused by the robot."""
+        with _named(self._library):
+            self._robot.automatic_error_recovery()
+
+    def reach(self) -> None:
+        """Reach the robot to look at it; tell it nothing."""
+        with _named(self._library), realtime.kept():
+            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
 
     def look(self, reading: np.ndarray) -> None:
         """Fill a reading of a robot at rest."""
@@ -75,8 +87,10 @@ class FrankaPort:
 
     def read(self, reading: np.ndarray) -> int:
         """Wait for the next state, a second at most; return the milliseconds since the last."""
-        with _named(self._library):
+        try:
             state, passed = self._control.readOnce()
+        except Exception as error:
+            raise as_ours(self._library, error) from None
         self._fill(reading, state)
         return round(1000.0 * passed.to_sec())
 
@@ -96,8 +110,10 @@ class FrankaPort:
 
     def write(self, torque: np.ndarray) -> None:
         """Send joint torques, (7,), N m, gravity not included."""
-        with _named(self._library):
+        try:
             self._control.writeOnce(self._library.Torques(torque.tolist()))
+        except Exception as error:
+            raise as_ours(self._library, error) from None
 
     def finish(self) -> None:
         """End the motion: the robot holds itself."""
@@ -132,10 +148,19 @@ def _named(library: Any) -> Any:
     """Raise what the library raises as a `RobotError` with libfranka's names of what went wrong."""
     try:
         yield
-    except library.NetworkException as error:
-        raise RobotSilentError((), _line(error)) from None
-    except (library.FrankaException, RuntimeError, ValueError) as error:
-        raise RobotError(_names_in(str(error)), _line(error)) from None
+    except Exception as error:
+        raise as_ours(library, error) from None
+
+
+def as_ours(library: Any, error: Exception) -> Exception:
+    """Return what the library raised as a `RobotError`; what is none of its errors as it is."""
+    kinds = (getattr(library, "FrankaException", RuntimeError), RuntimeError, ValueError)
+    silent = getattr(library, "NetworkException", ())
+    if isinstance(error, silent) or (isinstance(error, kinds) and _SILENT in str(error)):
+        return RobotSilentError((), _line(error))
+    if isinstance(error, kinds):
+        return RobotError(_names_in(str(error)), _line(error))
+    return error
 
 
 def _line(error: Exception) -> str:

@@ -37,6 +37,10 @@ class RobotPort(Protocol):
         """Reach the robot and prepare it; it does not move. Raises `RobotError`."""
         ...
 
+    def recover(self) -> None:
+        """Acknowledge what stopped the robot, so that it can be controlled again; it does not move."""
+        ...
+
     def look(self, reading: np.ndarray) -> None:
         """Fill a reading of a robot that is not controlled; `reading_dtype`, one record."""
         ...

@@ -53,6 +53,7 @@ class ColourCamera(Unique):
         self._library, self._serial = library(), serial
         self._sensor, self._profile = sensor, profile
         self._queue: Any = None
+        self._found = ""
         self._picture: np.ndarray | None = None
         self._number, self._arrived, self._tried = -1, time.monotonic(), -AGAIN_S
 
@@ -84,6 +85,7 @@ class ColourCamera(Unique):
         for sensor in devices[0].query_sensors():
             for profile in sensor.get_stream_profiles():
                 if self._is_wanted(profile):
+                    self._found = devices[0].get_info(self._library.camera_info.serial_number)
                     return sensor, profile
         raise CameraError(f"the camera has no colour pictures of {WIDTH} × {HEIGHT} at {RATE_HZ} Hz; use USB 3")
 
@@ -97,6 +99,11 @@ class ColourCamera(Unique):
     def intrinsics(self) -> Any:
         """Of the pictures, as the device knows them."""
         return self._profile.as_video_stream_profile().intrinsics
+
+    @property
+    def serial(self) -> str:
+        """Of the device that was opened; what was asked for where a software device is read."""
+        return self._found or self._serial or ""
 
     def newest(self, wait_ms: int = 0) -> tuple[np.ndarray | None, int, float]:
         """Return the newest picture, its number, and for how long none has come, ms.

@@ -43,6 +43,7 @@ status_dtype = np.dtype(
         ("tool_speed", _f),  # m/s
         ("contact_link", _i),  # 0 for none
         ("contact_nm", _f),  # size of its torque
+        ("contact_n", _f),  # and of its force, as far as torques tell it
         ("tool_n", _f),  # force on the tool
         ("busy", _i, (BUSY_BINS,)),  # histogram
         ("rows", _i),  # ticks put into the ring

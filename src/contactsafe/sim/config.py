@@ -112,6 +112,9 @@ FRANKA_SENSORS = SensorConfig(
 )  # fmt: skip
 """As a real Panda's recordings show: velocity with 4 to 6 mrad/s of noise between 5 and 50 Hz, and torque sensors."""
 
+SENSORS = {"encoders": REAL_SENSORS, "franka": FRANKA_SENSORS}
+"""Sensors of real arms, by name."""
+
 
 @dataclass(frozen=True)
 class WorldConfig:

@@ -1,4 +1,7 @@
-"""Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together."""
+"""Ink in a photograph of the board: evened light, a threshold that follows the noise, specks that hold together.
+
+What is too faint or too thin for that is still ink where it is a line: darker than both its sides, and long.
+"""
 
 from dataclasses import dataclass
 
@@ -12,6 +15,9 @@ INK_PIXEL, OTHER_PIXEL = 0, 255
 
 _COARSE = 4  # photograph's pixels along an edge of one of the background's
 _WINDOW = 5  # of the background's pixels: strokes and blobs must be narrower, shadows wider
+_LINE_BLUR_PX = 1.2
+_LINE_WIDTH_PX = 1.7  # of a thin line's core, in the mean
+_GLARE = 17  # of the background's pixels: reflections are narrower
 _DEEPEST = 0.20  # fraction of the board's brightness that is left in the darkest shadow
 
 
@@ -25,6 +31,9 @@ class InkThresholds:
         sharp: change of brightness from one pixel to those around it, as a fraction of the board's.
         least_px: of the photograph's pixels, the fewest that make a speck.
         covered: fraction of a mask's pixel, covered by ink, that marks it.
+        line: a pixel this fraction darker than both sides of a line may be ink, where the line is long.
+        clear_line: a line has a pixel this much darker.
+        line_px: of the photograph's pixels, how long a line is at least; half as many are as wide as one is at most.
         rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
     """
 
@@ -33,6 +42,9 @@ class InkThresholds:
     sharp: float = 0.12
     least_px: int = 3
     covered: float = 0.10
+    line: float = 0.03
+    clear_line: float = 0.045
+    line_px: int = 14
     rim_px: int = 3
 
 
@@ -104,8 +116,10 @@ class Segmenter:
         ink = np.zeros((n, n), np.uint8)
         if seen.any():
             darkest = _darkest(photo[self._window], seen)
-            evened = cv2.divide(darkest, _background(darkest, seen), scale=_BRIGHT)
-            ink[self._window] = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
+            background = _background(darkest, seen)
+            evened = cv2.divide(darkest, background, scale=_BRIGHT)
+            specks = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
+            ink[self._window] = cv2.bitwise_or(specks, self._lines(darkest, background, seen))
         covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
         return np.where(covered > 255 * self.ink.covered, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
 
@@ -132,6 +146,27 @@ class Segmenter:
         kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
         kept[stats[:, cv2.CC_STAT_AREA] < self.ink.least_px] = 0
         ink = np.zeros_like(evened)
+        ink.ravel()[places] = kept[names]
+        return ink
+
+    def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
+        smooth = cv2.min(cv2.GaussianBlur(darkest, (5, 5), _LINE_BLUR_PX), background)  # between reflections is no line
+        np.copyto(smooth, background, where=seen == 0)
+        sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
+        hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
+        usual, noise = _middle_and_spread(hollow, seen)
+        core = hollow > cv2.dilate(hollow, np.ones((5, 5), np.uint8)) // 2  # and not what blurs beside it
+        dark = hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)
+        candidates = cv2.bitwise_and((dark & core).view(np.uint8), seen)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
+        places = np.flatnonzero(candidates)
+        names = labels.ravel()[places]
+        kept = np.zeros(count, np.uint8)
+        kept[names[hollow.ravel()[places] > max(usual + 7 * noise, _BRIGHT * self.ink.clear_line)]] = 255
+        kept[stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1) < self.ink.line_px] = 0
+        kept[stats[:, cv2.CC_STAT_AREA] < _LINE_WIDTH_PX * self.ink.line_px] = 0
+        ink = np.zeros_like(darkest)
         ink.ravel()[places] = kept[names]
         return ink
 
@@ -173,8 +208,17 @@ def _background(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:
     inside = high.copy()
     inside[~whole] = 255
     closed = cv2.min(cv2.erode(inside, window), high)
-    smooth = np.maximum(cv2.GaussianBlur(closed, (5, 5), 0), 1)
+    smooth = np.maximum(cv2.GaussianBlur(_without_glare(closed, whole), (5, 5), 0), 1)
     return cv2.resize(smooth, picture.shape[::-1], interpolation=cv2.INTER_LINEAR)
+
+
+def _without_glare(level: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Open the brightness of the board: a reflection is brighter than what is about it, and a gap in it no line."""
+    window = np.ones((_GLARE, _GLARE), np.uint8)
+    inside = np.where(whole, level, 255).astype(np.uint8)
+    low = cv2.erode(inside, window)
+    low[~whole] = 0
+    return cv2.min(cv2.dilate(low, window), level)
 
 
 def _histogram(picture: np.ndarray, seen: np.ndarray) -> np.ndarray:

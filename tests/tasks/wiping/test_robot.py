@@ -13,7 +13,7 @@ from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_s
 pytest.importorskip("cv2")
 pytest.importorskip("pyrealsense2")
 
-from contactsafe.tasks.wiping.robot_pictures import PhotographedBoard
+from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
 from contactsafe.tasks.wiping.robot_work import WipingWork
 
 
@@ -106,7 +106,7 @@ class Shown:
     def __init__(self, photo):
         self.photo, self.number, self.age_ms = photo, 0, 0.0
 
-    def open(self):
+    def open(self, lockstep):
         pass
 
     def latest(self, tick):

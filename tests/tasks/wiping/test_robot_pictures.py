@@ -1,6 +1,7 @@
 """A RealSense before the board: its pictures as photographs, its silence as age, its absence in one line."""
 
 import math
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,8 @@ from contactsafe.robot import robots
 from contactsafe.tasks.wiping import robot_pictures
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.robot_board import create_shown, map_shown
-from contactsafe.tasks.wiping.robot_pictures import CameraPictures, PhotographedBoard, focal_px
+from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
+from contactsafe.tasks.wiping.robot_pictures import CameraPictures, focal_px
 
 
 class Source:
@@ -121,3 +123,23 @@ def test_the_software_camera_takes_thirty_pictures_a_second_and_each_once(tmp_pa
 
 def test_the_software_camera_can_be_closed_before_it_was_opened(tmp_path):
     PhotographedBoard(tmp_path / "board", robots.fr3(), BoardConfig(), Camera(), 3).close()
+
+
+def test_by_the_clock_a_process_of_its_own_draws_and_ends_with_the_camera(tmp_path):
+    create_shown(tmp_path / "board", BoardConfig())
+    arm, shown = robots.fr3(), map_shown(tmp_path / "board", BoardConfig())[0]
+    shown["q"] = arm.home
+    made = PhotographedBoard(tmp_path / "board", arm, BoardConfig(), Camera(), 3)
+    made.open(lockstep=False)
+    try:
+        first, number, _ = made.latest(0)
+        assert (number, first.std() > 5.0) == (0, True)
+        shown["tick"] = 99
+        until = time.monotonic() + 30.0
+        while number != 3 and time.monotonic() < until:
+            photo, number, age_ms = made.latest(105)
+        assert (number, age_ms) == (3, 6.0)
+        assert photo is not first
+    finally:
+        made.close()
+    assert not made._process.is_alive()

@@ -41,10 +41,15 @@ class RobotTask(Protocol):
     tool: Tool
 
     def work(self, **looks: Any) -> Work:
-        """Return the work on a real robot, with what it looks with."""
+        """Return the work on a real robot.
+
+        Args:
+            looks: what it looks with: `camera`, a serial number; `camera_calibration`, what `contactsafe calibrate`
+                wrote. A task without a camera refuses the latter.
+        """
         ...
 
-    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
+    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool, **looks: Any) -> Simulated:
         """Return a run on a simulated one.
 
         Args:
@@ -53,6 +58,7 @@ class RobotTask(Protocol):
             seed: of what is drawn at random.
             rounds: of work.
             met: a person pushes the arm and holds a bottle against it.
+            looks: as of `work`.
         """
         ...
 

@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import rotvec_to_quat
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
@@ -150,11 +151,12 @@ class InsertionRobot:
     tool = PEG
 
     def work(self, **looks: Any) -> InsertionWork:
-        """Return the work."""
-        del looks
+        """Return the work; no camera looks."""
+        if looks.get("camera_calibration") is not None:
+            raise InvalidInputError("insertion looks with no camera; leave out the camera's calibration")
         return InsertionWork(InsertionConfig())
 
-    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
+    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool, **looks: Any) -> Simulated:
         """Return a run over blocks that stand beside where they are believed to be."""
         del shared, met
         config = InsertionConfig()
@@ -165,4 +167,4 @@ class InsertionRobot:
             deep = truth["position"][:, 2] <= config.mouth[2] - config.depth_m
             return {"done, pegs that went in": float(np.count_nonzero(np.diff(deep.astype(int)) > 0)) / rounds}
 
-        return Simulated(scene, MovedBlock(config, seed, rounds), self.work(), figures)
+        return Simulated(scene, MovedBlock(config, seed, rounds), self.work(**looks), figures)

@@ -31,6 +31,17 @@ _TO_MIDDLES = np.array([[1, 0, -0.5], [0, 1, -0.5], [0, 0, 1]])  # OpenCV counts
 _NOISE_SIGMA, _SPARE = 25.0, 64  # of the grain as stored about 128; pixels by which it is larger than a picture
 
 
+def enlarged(camera: Camera) -> Camera:
+    """Return the camera of the photograph from which a mask's is scaled."""
+    return replace(camera, size=PHOTO_PX, focal_px=camera.focal_px * PHOTO_PX / camera.size)
+
+
+def corners_of(board: BoardConfig) -> np.ndarray:
+    """Return a board's corners in turn around it, (4, 2), world, m."""
+    halves = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) * np.array(board.size) / 2
+    return np.array(board.centre[:2]) + halves
+
+
 @dataclass(frozen=True)
 class Conditions:
     """Light, pen and camera of an episode.
@@ -140,12 +151,11 @@ class Photographer(Independent):
     _bound = ("_posed",)
 
     def __init__(self, camera: Camera, board: BoardConfig, model: mujoco.MjModel):
-        scale = PHOTO_PX / camera.size
-        fine = replace(camera, size=PHOTO_PX, focal_px=camera.focal_px * scale)
+        fine = enlarged(camera)
         x, y, z = board.centre
         half_x, half_y = np.array(board.size) / 2
         self.homography = plane_homography(fine, z)
-        self.corners = np.array([[x + a * half_x, y + b * half_y] for a, b in ((-1, -1), (-1, 1), (1, 1), (1, -1))])
+        self.corners = corners_of(board)
         self._board = board
         self._eye = np.array(camera.position)
         R = camera_axes(camera).T

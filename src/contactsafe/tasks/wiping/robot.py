@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.franka import WIPER
 from contactsafe.sim.fixtures import TipSurface, workbench
@@ -12,9 +13,17 @@ from contactsafe.sim.franka_meetings import WORK_BEGINS_S
 from contactsafe.sim.franka_scene import FrankaScene
 from contactsafe.tasks.base.robot import Simulated, met_by
 from contactsafe.tasks.wiping.config import WipingConfig
+from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
-from contactsafe.tasks.wiping.robot_pictures import CameraPictures, PhotographedBoard
+from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
+from contactsafe.tasks.wiping.robot_pictures import CameraPictures
 from contactsafe.tasks.wiping.robot_work import WipingWork
+
+
+def _placed(looks: dict[str, Any]) -> PlacedCamera | None:
+    """Return camera and board where a calibration among what a task looks with says, None where there is none."""
+    calibration, config = looks.get("camera_calibration"), WipingConfig()
+    return None if calibration is None else PlacedCamera(calibration, config.board, config.camera)
 
 
 class WipingRobot:
@@ -23,19 +32,30 @@ class WipingRobot:
     tool = WIPER
 
     def work(self, **looks: Any) -> WipingWork:
-        """Return the work, with the pictures that it looks at, or those of the camera of a serial number."""
-        config = WipingConfig()
-        pictures = looks.get("pictures") or CameraPictures(looks.get("camera"), config.camera)
-        return WipingWork(pictures, config.board, config.camera, config.action)
+        """Return the work, with the pictures that it looks at, or those of the camera of a serial number.
 
-    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool) -> Simulated:
-        """Return a run before boards of random strokes, seen in photographs."""
+        Raises:
+            InvalidInputError: the calibration is of another camera, or of a place where the task cannot be done.
+        """
+        config, placed = WipingConfig(), _placed(looks)
+        serial = looks.get("camera") or (placed and placed.calibration.serial) or None
+        if placed is not None and serial and placed.calibration.serial not in ("", serial):
+            raise InvalidInputError(
+                f"camera {serial} is not the one that was calibrated, {placed.calibration.serial}; calibrate it, or "
+                "leave --camera out"
+            )
+        pictures = looks.get("pictures") or CameraPictures(serial, config.camera, placed)
+        return WipingWork(pictures, config.board, config.camera, config.action, placed)
+
+    def simulated(self, arm: Arm, shared: Path, seed: int, rounds: int, met: bool, **looks: Any) -> Simulated:
+        """Return a run before boards of random strokes, seen in photographs; where a calibration says, if any."""
         config, path = WipingConfig(), shared.with_name(f"{shared.name}-board")
-        board, tip = config.board, self.tool.tip
+        placed, tip = _placed(looks), self.tool.tip
+        board = config.board if placed is None else placed.board
         create_shown(path, board)
         assert tip is not None
         effect = WipedBoard(path, board, tip.half_size, "strokes", seed, rounds, first_s=WORK_BEGINS_S if met else 0.0)
-        work = self.work(pictures=PhotographedBoard(path, arm, board, config.camera, seed))
+        work = self.work(pictures=PhotographedBoard(path, arm, board, config.camera, seed, placed), **looks)
         scene = FrankaScene(self.tool, TipSurface(friction=board.friction), (workbench(board.centre, board.size),))
         shown = map_shown(path, board)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from contactsafe.hardware.realsense import HEIGHT, WIDTH
 from contactsafe.tasks.wiping.board import BoardConfig
 from contactsafe.tasks.wiping.drawings import Boards, paint_board
 from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard, erase_under_pad
@@ -23,7 +24,7 @@ _MOST = 64  # boards of a run
 
 
 def shown_dtype(board: BoardConfig) -> np.dtype:
-    """Describe what a board shows: its cells, and where the arm before it is."""
+    """Describe what a board shows: its cells, where the arm before it is, and what a camera saw last."""
     return np.dtype(
         [
             ("number", np.int64),  # of the board, from 0
@@ -32,6 +33,8 @@ def shown_dtype(board: BoardConfig) -> np.dtype:
             ("ink_start", np.int64, (_MOST,)),  # cells when it was drawn
             ("ink", np.int64, (_MOST,)),  # cells left
             ("cells", np.uint8, Whiteboard(board).cells.shape),
+            ("taken", np.int64, (2,)),  # number of the last two pictures of it, from 1; 0 while one is being drawn
+            ("pictures", np.uint8, (2, HEIGHT, WIDTH, 3)),  # they alternate
         ]
     )
 

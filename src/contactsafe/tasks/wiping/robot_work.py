@@ -12,6 +12,7 @@ from contactsafe.sim.config import WorldConfig
 from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
+from contactsafe.tasks.wiping.placed_camera import PlacedCamera
 from contactsafe.vision.opencv import keep_to_one_thread
 from contactsafe.vision.segment import Segmenter
 
@@ -31,7 +32,7 @@ _LEAST_PX = 3
 class Pictures(Protocol):
     """What takes pictures of the board."""
 
-    def open(self) -> None:
+    def open(self, lockstep: bool) -> None:
         """Begin, in the policy's process."""
         ...
 
@@ -51,22 +52,24 @@ class WipingWork:
     Attributes:
         pictures: of the board.
         board, camera, action: as the policy was trained with.
+        placed: camera and board where they were calibrated to be; None where they are as in training.
     """
 
     pictures: Pictures
     board: BoardConfig = field(default_factory=BoardConfig)
     camera: Camera = field(default_factory=Camera)
     action: ActionConfig = field(default_factory=ActionConfig)
+    placed: PlacedCamera | None = None
 
     @property
     def centre(self) -> tuple[float, float, float]:
         """Middle of the board."""
-        return self.board.centre
+        return self.board.centre if self.placed is None else self.placed.board.centre
 
     @property
     def start(self) -> Pose:
         """Above it."""
-        return Pose(np.add(self.board.centre, [0.0, 0.0, _START_M]), DOWN)
+        return Pose(np.add(self.centre, [0.0, 0.0, _START_M]), DOWN)
 
     @property
     def travel_m_s(self) -> float:
@@ -75,33 +78,41 @@ class WipingWork:
 
     @property
     def homography(self) -> np.ndarray:
-        """Of the masks."""
+        """Of the masks, in the policy's frame: that of training, wherever camera and board are."""
         from contactsafe.tasks.wiping.camera import plane_homography
 
         return plane_homography(self.camera, self.board.centre[2])
 
     def prepare(self, arm: Arm, lockstep: bool) -> None:
         """Open the camera."""
-        del lockstep
         keep_to_one_thread()
         self._eye = Photographer(self.camera, self.board, build_plant(arm, WorldConfig(fixtures=())))
-        self._segmenter = Segmenter(self._eye.homography, self._eye.corners, PHOTO_PX, self.camera.size)
+        self._view = None if self.placed is None else self.placed.view()
+        corners = self._eye.corners if self.placed is None else self.placed.corners
+        self._segmenter = Segmenter(self._eye.homography, corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
-        self.pictures.open()
+        self.pictures.open(lockstep)
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
-        """Segment the newest picture; where the arm hides the board is known by its joints."""
-        del pose, steps
+        """Segment the newest picture; where the arm hides the board is known by its joints.
+
+        Where the board was calibrated to lie elsewhere, the pose is given in the policy's frame, too.
+        """
+        del steps
         picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
         if number != self._number:
             self._number = number
-            hidden = self._eye.hidden(self._eye.solids_at(seen["q"]))
+            solids = self._eye.solids_at(seen["q"])
+            hidden = self._eye.hidden(solids) if self._view is None else self._view.hidden(solids)
             self._mask = self._segmenter.segment(picture, hidden)
             shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
             self._clean = 0 if shows else self._clean + 1
             self._inked = self._inked + 1 if shows else 0
-        return {"mask": self._mask[..., None], "force": np.asarray(seen["force"])}
+        observed = {"mask": self._mask[..., None], "force": np.asarray(seen["force"])}
+        if self.placed is not None:
+            observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
+        return observed
 
     def is_blind(self) -> bool:
         """Tell whether the camera shows what is past."""
