@@ -12,6 +12,7 @@ from benchmarks.findings.equations import (
     projector_is_zero,
     sign_of_the_external_torque,
 )
+from benchmarks.findings.landing import tool_that_lands_under_a_push
 from benchmarks.findings.peaks import (
     bounded_push,
     force_added_drags_the_arm,
@@ -39,6 +40,7 @@ FINDINGS: dict[int, Callable[[], None]] = {
     17: impact_on_a_fixed_obstacle,
     18: force_and_energy,
     19: gains_that_pump,
+    22: tool_that_lands_under_a_push,
 }
 
 

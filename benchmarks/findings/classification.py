@@ -41,7 +41,7 @@ def push_or_obstacle() -> None:
 def _pushed(scenes: Scenes, config: cs.ControllerConfig = SAFE) -> list[np.ndarray]:
     """Push each arm with 25 N for 1.5 s instead, on link 4, 5 or 6, from the side."""
     n = len(scenes.motions)
-    worlds = Worlds(ARM, [motion.world((), True) for motion in scenes.motions], config, n, scenes.seeds)
+    worlds = Worlds(ARM, [motion.world((), REAL_SENSORS) for motion in scenes.motions], config, n, scenes.seeds)
     play, steps = Playback(worlds, scenes.motions), np.zeros((n, MAX_TICKS), dtype=trace_dtype(ARM.n))
     for i, motion in enumerate(scenes.motions):
         link, angle = 4 + i % 3, 2.4 * i

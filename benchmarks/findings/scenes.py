@@ -12,7 +12,7 @@ from contactsafe.experiments.collision_motions import sample_motion
 from contactsafe.experiments.collision_scenes import sample_meetings
 from contactsafe.experiments.franka_links import PUSH_POINTS
 from contactsafe.experiments.motions import record
-from contactsafe.sim.config import NO_NOISE, WorldConfig
+from contactsafe.sim.config import NO_NOISE, REAL_SENSORS, WorldConfig
 from contactsafe.sim.obstacles import Obstacle
 from contactsafe.sim.truth import trace_dtype
 from contactsafe.sim.worlds import Worlds
@@ -114,7 +114,7 @@ class Scenes:
                 self.motions.append(motion)
             seed += 1
         self.seeds = [motion.seed for motion in self.motions]
-        worlds = Worlds(ARM, [motion.world((), True) for motion in self.motions], VICES, wanted, self.seeds)
+        worlds = Worlds(ARM, [motion.world((), REAL_SENSORS) for motion in self.motions], VICES, wanted, self.seeds)
         self.free = record(worlds, self.motions)
         worlds.close()
         self.obstacles = [

@@ -99,7 +99,7 @@ def test_an_unknown_command_is_refused(capsys):
     assert main(["dance"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    known = "demo, train, evaluate, experiment, replay, identify, record, run, bench, warmup"
+    known = "demo, train, evaluate, experiment, replay, identify, record, calibrate, run, bench, warmup"
     assert err == f"contactsafe: command 'dance' is unknown; choose from {known}\n"
 
 

@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 from contactsafe.control.classification import goes_on, is_stiff
 
 SOFTEST = 1500.0
+SPRING = 0.0
+"""Anything counts as an obstacle, however soft."""
 
 levers = st.floats(0.03, 1.0)
 displacements = st.floats(1e-4, 0.1)
@@ -17,19 +19,19 @@ def test_no_spring_that_took_its_energy_from_the_arm_is_a_push(torque, stiffness
     """A spring of κ N m/rad took τ² / (2 κ); receding by x it loses κ x, all of it at most."""
     displacement = receded * torque / stiffness
     taken = 0.5 * torque * torque / stiffness
-    assert not goes_on(stiffness * displacement, displacement, torque, taken, 0.0)
-    assert not goes_on(torque, displacement + 1.0, torque, taken, 0.0)
+    assert not goes_on(stiffness * displacement, displacement, torque, taken, SPRING, 0.0)
+    assert not goes_on(torque, displacement + 1.0, torque, taken, SPRING, 0.0)
 
 
 @given(torque=torques, taken=st.floats(0.0, 0.05), rise=st.floats(0.0, 20.0))
 def test_a_torque_that_goes_on_is_a_push_once_the_fall_of_a_spring_would_stand_out(torque, taken, rise):
     displacement = 4.0 * max(taken, 0.0005) / torque
-    assert goes_on(-rise, displacement, torque, taken, 0.0)
+    assert goes_on(-rise, displacement, torque, taken, SPRING, 0.0)
 
 
 @given(torque=torques, taken=st.floats(0.0, 0.05), displacement=displacements)
 def test_what_the_models_errors_may_feign_is_no_push(torque, taken, displacement):
-    assert not goes_on(0.0, displacement, torque, taken, torque)
+    assert not goes_on(0.0, displacement, torque, taken, SPRING, torque)
 
 
 @given(stiffness=st.floats(SOFTEST, 1e6), lever=levers, displacement=displacements)
@@ -42,3 +44,18 @@ def test_the_softest_obstacle_is_stiff_once_its_fall_stands_out(stiffness, lever
 @given(lever=levers, displacement=displacements, change=st.floats(-20.0, 0.0))
 def test_what_does_not_fall_is_not_stiff(lever, displacement, change):
     assert not is_stiff(change, displacement, SOFTEST * lever**2, 0.0)
+
+
+@given(torque=torques, taken=st.floats(0.0, 10.0), lever=levers)
+def test_what_is_softer_than_any_obstacle_goes_on_whatever_it_took(torque, taken, lever):
+    """A person who pushes a moving arm from the front takes as much work as a soft spring."""
+    softest = SOFTEST * lever**2
+    assert goes_on(0.0, 4.0 * torque / softest, torque, taken, softest, 0.0)
+
+
+@given(stiffness=st.floats(SOFTEST, 1e6), lever=levers, torque=torques, receded=st.floats(0.0, 1.0))
+def test_no_obstacle_is_softer_than_that(stiffness, lever, torque, receded):
+    spring = stiffness * lever**2
+    displacement = receded * torque / spring
+    taken = 0.5 * torque * torque / spring
+    assert not goes_on(spring * displacement, displacement, torque, taken, SOFTEST * lever**2, 0.0)

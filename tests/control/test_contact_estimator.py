@@ -302,14 +302,6 @@ def test_an_arm_whose_surface_nobody_knows_has_a_link_and_no_place(arm):
     assert np.isnan(contact.point).all()
 
 
-def test_the_controller_invents_no_place(arm):
-    plant, controller = Plant(arm), controller_at(arm, presets.safe())
-    plant.push("link5", (0.0, 30.0, 0.0))
-    out = plant.run(controller, hold(arm), 200, UNTOUCHED)
-    assert out.contact.in_contact
-    assert np.isnan([out.contact.probability, *out.contact.point, *out.contact.force]).all()
-
-
 def test_a_copy_goes_on_by_itself(arm, estimator):
     torque, _ = push_on(arm, 5, (0.0, 25.0, 0.0))
     feel(estimator, still(arm), 200)

@@ -1,5 +1,7 @@
 """Adversarial targets: what counts as a violation, and that a run is its seed's."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -81,7 +83,8 @@ def test_a_run_is_its_seeds_alone():
 
 
 def test_safe_keeps_every_limit(monkeypatch):
-    monkeypatch.setattr("contactsafe.experiments.adversarial.run_adversarial", lambda *a: run_adversarial(*a, 1000))
+    short = functools.partial(run_adversarial, ticks=1000)
+    monkeypatch.setattr("contactsafe.experiments.adversarial.run_adversarial", short)
     told = []
     found = adversarial(ExperimentConfig(("safe",), 3, 11), told.append)
     assert told == [3]

@@ -32,7 +32,7 @@ def test_the_usual_sensors_need_no_words():
 def test_a_franka_measures_its_torque(name, measured):
     arm, motion = robots.panda(), sample_motion(robots.panda(), 0)
     worlds = Worlds(arm, [motion.world((), ExperimentConfig(sensors=name).real_sensors)], presets.safe(), 1, [0])
-    worlds.run(50)
+    worlds.run(17)
     found = worlds.controllers[0]["measurement"]
     assert found["has_torque"] == measured
     assert np.isfinite(found["qd"]).all()

@@ -37,6 +37,8 @@ def test_a_run_went_well_where_it_stopped_for_a_good_reason_and_was_recorded(exc
 def test_the_busy_time_is_told_by_its_distribution(exchange):
     exchange.status["busy"][0, [30, 100, 700]] = [980, 15, 5]
     assert ending_of(exchange).busy_us == (30, 100, 700, 5)
+    assert ending_of(exchange).busy_ticks[-1] == 5
+    assert sum(ending_of(exchange).busy_ticks) == exchange.status["busy"].sum()
 
 
 def test_a_run_in_which_all_do_their_part_ends_well_and_leaves_nothing(exchange):

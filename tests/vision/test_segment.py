@@ -184,3 +184,20 @@ def test_the_gap_between_two_reflections_is_no_line(segmenter, gap, gain):
     for blur in (1.5, 3.0, 6.0):
         lit = board(180.0, 3.0) + gain * cv2.GaussianBlur(lamps, (0, 0), blur)
         assert (segmenter.segment(photo(lit)) == 255).all()
+
+
+def test_the_dark_edge_of_a_picture_that_was_straightened_is_no_line():
+    H_all = np.array([[1500.0, 0, -50], [0, 1500.0, -40], [0, 0, 1]])  # the board is larger than the picture
+    picture = np.full((N, N), 180.0)
+    picture[:, :2] = 158.0
+    assert (Segmenter(H_all, CORNERS).segment(photo(picture)) == 255).all()
+
+
+@pytest.mark.parametrize("offset", [0, 6, 12, 25])
+def test_beside_the_arm_in_its_own_shadow_is_no_line(segmenter, offset):
+    arm, shadow = np.zeros((N, N), np.uint8), np.zeros((N, N))
+    arm[30:200, 180:240] = 255  # it reaches over the board's edge
+    shadow[20 : 200 + offset, 180 + offset : 250 + offset] = 1.0
+    picture = board(noise=3.0) * (1.0 - 0.35 * cv2.GaussianBlur(shadow, (0, 0), 6.0))
+    picture = cv2.GaussianBlur(np.where(arm > 0, 40.0, picture), (0, 0), 1.2)
+    assert (segmenter.segment(photo(picture), arm) == 255).all()

@@ -120,7 +120,7 @@ def _print(asked: Options, target: "CharucoTarget") -> None:
     from contactsafe.vision.sheet import write_sheet
 
     paper = write_sheet(target, asked.path)
-    size = [1000.0 * edge for edge in target.size]
+    size = [1000.0 * edge for edge in target.extent]
     found = {"file": str(asked.path), "paper": paper, "square_mm": asked.square_mm, "size_mm": size}
     said = f"{asked.path}: {size[0]:g} × {size[1]:g} mm on {paper}; print at 100 %, then measure the squares"
     print(json.dumps(found, indent=1) if asked.json else said)

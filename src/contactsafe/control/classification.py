@@ -38,6 +38,7 @@ def classification_dtype(n: int) -> np.dtype:
             ("torque_smooth_nm", _f),  # contact torque along its direction, smoothed
             ("reference_nm", _f),  # the same at the reference: where the arm last stopped moving into the contact
             ("reference_j", _f),  # work that the contact had taken at most by then
+            ("furthest_rad", _f),  # by which the arm has receded at most since the reference
             ("decision_rad", _f),  # displacement at which the contact is asked again whether it goes on
             ("advanced_rad", _f),  # by which the arm has moved into the contact since it last receded
             ("before_nm", _f),  # contact torque before that
@@ -58,7 +59,7 @@ def begin_classification(classification: Record) -> None:
     classification.displacement_rad, classification.displacement_smooth_rad = 0.0, 0.0
     classification.torque_smooth_nm, classification.reference_nm, classification.reference_j = 0.0, 0.0, 0.0
     classification.advanced_rad, classification.before_nm = 0.0, 0.0
-    classification.decision_rad = 0.0
+    classification.furthest_rad, classification.decision_rad = 0.0, 0.0
 
 
 @inlined
@@ -86,7 +87,7 @@ def classify(
     _follow_contact(classification, isolation.direction, torque, step)
     active, probe = is_active(work), params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
-    if classification.displacement_smooth_rad <= 0.0:
+    if _comes_back(classification, _CERTAIN * probe):
         _advance(classification, work.taken_j, probe)
         if mode == REJECT and not active and _hinders(classification, probe, softest, doubt_nm):
             return OBSTACLE
@@ -95,6 +96,14 @@ def classify(
     if classification.displacement_smooth_rad <= 0.0:
         return PUSH if active else NO_CONTACT
     return _receded(classification, active, doubt_nm, mode, probe, softest)
+
+
+@inlined
+def _comes_back(classification: Record, far: float) -> bool:
+    """Tell whether the arm moves into the contact: on from where it last stopped, or far from where it receded to."""
+    displacement = classification.displacement_smooth_rad
+    classification.furthest_rad = max(classification.furthest_rad, displacement)
+    return displacement <= 0.0 or displacement < classification.furthest_rad - far
 
 
 @inlined
@@ -117,7 +126,7 @@ def _receded(classification: Record, active: bool, doubt_nm: float, mode: int, p
         return OBSTACLE
     if displacement > classification.decision_rad:
         classification.decision_rad = displacement + probe
-        active = active or goes_on(drop, displacement, before, classification.reference_j, doubt_nm)
+        active = active or goes_on(drop, displacement, before, classification.reference_j, softest, doubt_nm)
     return PUSH if active else NO_CONTACT
 
 
@@ -126,7 +135,7 @@ def _advance(classification: Record, taken_j: float, probe: float) -> None:
     """Begin anew where the arm moves into the contact."""
     classification.advanced_rad -= classification.displacement_smooth_rad
     classification.displacement_rad -= classification.displacement_smooth_rad
-    classification.displacement_smooth_rad, classification.decision_rad = 0.0, probe
+    classification.displacement_smooth_rad, classification.furthest_rad, classification.decision_rad = 0.0, 0.0, probe
     classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
 
 
@@ -154,20 +163,23 @@ def is_stiff(change: float, displacement: float, softest: float, doubt_nm: float
 
 
 @compiled
-def goes_on(drop: float, displacement: float, torque: float, taken_j: float, doubt_nm: float) -> bool:
+def goes_on(drop: float, displacement: float, torque: float, taken_j: float, softest: float, doubt_nm: float) -> bool:
     """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
     A spring that took A joules to come to a torque of τ loses τ² / (2 A) for every radian that the arm recedes; a push
-    goes on. Half of that draws the line, and it must stand out.
+    goes on. So does what is softer than anything that counts as an obstacle. Half of that draws the line, and it must
+    stand out.
 
     Args:
         drop: by which the contact's torque has fallen, N m.
         displacement: by which the arm has receded along the contact's direction meanwhile, rad.
         torque: of the contact before, N m.
         taken_j: work that it had taken at most before, J.
+        softest: thing that counts as an obstacle, k l², N m/rad; half of it, for its lever arm is a guess.
         doubt_nm: by which the model's errors may have changed the torque, N m.
     """
-    expected = min(0.5 * torque * torque / max(taken_j, _LEAST_J) * displacement, torque)
+    stiffness = max(0.5 * torque * torque / max(taken_j, _LEAST_J), 0.5 * softest)
+    expected = min(stiffness * displacement, torque)
     return drop < 0.5 * expected - _STANDS_OUT_NM - doubt_nm
 
 

@@ -107,10 +107,10 @@ def estimate(c: Record, J_bar: Matrix) -> None:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:
         pushed = is_active(state.contact_work) and _is_beside_tool(state, J_bar, params.identification)
-        memory_gain = state.step.tool_memory_gain if state.mode == FREE and not pushed else 0.0
         separate_tool_wrench(
-            tool, detection.residual, observer, dynamics.J, J_bar, memory_gain, pushed, params.identification
-        )
+            tool, detection.residual, observer, dynamics.J, J_bar, state.mode, pushed, state.step,
+            params.identification,
+        )  # fmt: skip
     follow_change(c)
     supervise(c)
     _identify(c)
@@ -202,15 +202,22 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
     J_bar = matmul(J_M_inv.T, Lambda)
     estimate(c, J_bar)
     report_arm(c)
-    if c.state.clock.bridged > 0:
-        return
+    if c.state.clock.bridged == 0:
+        _feel_alone(c.state, c, J_bar)
+
+
+@inlined
+def _feel_alone(state: Record, c: Record, J_bar: Matrix) -> None:
+    """Report what touches arm or tool where no law goes by it."""
     follow_tool_force(
-        c.state.tool_wrench, c.state.arm, c.state.mode, c.state.observer.residual_fast, J_bar, c.state.step.probe_gain
+        state.tool_wrench, state.arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain
     )
     follow_touch(c)
-    c.state.touch.withholds = c.state.touch.touching
-    c.output.kind = c.state.touch.kind
-    report_touch(c.state, c.output)
+    state.touch.withholds = state.touch.touching
+    c.output.kind = state.touch.kind
+    report_touch(state, c.output)
+    if c.output.touched != 0:
+        c.output.link = c.output.touched
 
 
 @inlined
@@ -222,7 +229,7 @@ def report_touch(state: Record, out: Record) -> None:
     """
     touch, place = state.touch, state.localisation
     out.probability, out.several, out.touched = 1.0, 0, 0
-    out.point[:], out.force[:] = math.nan, 0.0
+    out.point[:], out.force[:] = 0.0, 0.0
     if touch.touching == 0 or place.best < 0:
         return
     out.probability = place.tool_probability if out.kind == TOOL else 1.0 - place.tool_probability

@@ -51,7 +51,6 @@ class Instance(Independent):
         """Clear what was measured, remembered and reported."""
         for part in ("state", "output", "measurement"):
             self.record[part] = np.zeros((), dtype=self.record[part].dtype)
-        self.record["output"]["point"] = np.nan
 
     def places(self, fraction: float = 0.95) -> list[Place]:
         """Return where the present contact may be: the places that together have a fraction of the probability.

@@ -135,7 +135,7 @@ def output_dtype(n: int) -> np.dtype:
             ("several", _i),  # whether no single contact explains the torques
             *(
                 (name, _f, (3,)) for name in ("point", "force")
-            ),  # where, m, NaN where unknown, and what is there, N; world
+            ),  # where, m, and what is there, N; world; 0 where `touched` is
             ("contact_command_nm", _f),  # commanded torque against the contact before it is bounded, N m
             ("contact_limit_nm", _f),  # the bound in force; inf where there is none
             ("limited_by", _i),  # sum of the keys of LIMITS that took something off the command

@@ -57,7 +57,8 @@ class Contact(NamedTuple):
             'none'.
         torque: estimated joint torque of the contact, (n,), N m (the fast residual).
         probability: of the kind's being right as to arm or tool, as far as joint torques tell.
-        point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints.
+        point: where on the surface, most probably, world, (3,), m; NaN where nothing shows in the joints. By a
+            controller it may lie beside `link`, which its law goes by.
             `ContactEstimator.places()` gives the others that explain the torques.
         force: of the environment there, as far as joint torques tell it, world, (3,), N.
         bridged: measurements in a row, up to this one, that were not believed: all this is of the last one that was.
@@ -117,11 +118,11 @@ def contact_of(out: dict[str, np.ndarray]) -> Contact:
     """Return what a tick reports of a contact, from the fields of an `output_dtype` record."""
     return Contact(
         in_contact=bool(out["mode"] != FREE),
-        link=int(out["touched"]) or int(out["link"]),
+        link=int(out["link"]) or int(out["touched"]),
         kind=KINDS[int(out["kind"])],
         torque=out["residual_fast"].copy(),
         probability=float(out["probability"]),
-        point=out["point"].copy(),
+        point=out["point"].copy() if out["touched"] else np.full(3, np.nan),
         force=out["force"].copy(),
         bridged=int(out["bridged"]),
         several=bool(out["several"]),

@@ -4,6 +4,7 @@ import numpy as np
 
 from contactsafe.control.codes import FREE
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
+from contactsafe.control.tool_in_contact import follow_tool_in_contact, forget_tool_in_contact, tool_in_contact_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import inlined
 from contactsafe.core.linalg import matvec_t_into
@@ -20,6 +21,7 @@ def tool_wrench_dtype(n: int) -> np.dtype:
             ("force", _f, (3,)),  # on the tool, by the sensor or the residual, smoothed, N
             ("arm_torque", _f, (n,)),  # compensating residual less the tool's part, N m
             ("arm_torque_fast", _f, (n,)),  # the fast one less the tool's part, N m
+            ("in_contact", tool_in_contact_dtype(n)),
         ]
     )
 
@@ -31,14 +33,16 @@ def separate_tool_wrench(
     observer: Record,
     J: Matrix,
     J_bar: Matrix,
-    memory_gain: float,
+    mode: int,
     pushed: bool,
+    step: Record,
     params: Record,
 ) -> None:
     """Split the residual into the tool's part and the arm's, where no force sensor does.
 
     A wrench at the tool never shows in the null space, N_tᵀ Jᵀ F = 0: what does is the arm's contact. So is a force
-    whose line passes far from the tool. Of the rest, the wrench that was there before the contact stays the tool's.
+    whose line passes far from the tool. Of the rest, the tool's is the wrench that was there before the contact, and
+    the force that has met it since.
 
     Args:
         tool: `tool_wrench_dtype` record; advanced.
@@ -46,26 +50,35 @@ def separate_tool_wrench(
         observer: `observer_dtype` record.
         J: task Jacobian, (6, n).
         J_bar: its dynamically consistent inverse, (n, 6).
-        memory_gain: of the tool's wrench in this tick; 0 while the arm is in contact.
+        mode, step: in force.
         pushed: whether somebody pushes the arm beside the tool.
         params: of identification.
     """
     n = detection_residual.shape[0]
-    tau_tool = stack_vector(n)
-    wrench = matvec_t_into(J_bar, observer.residual_fast, stack_vector(6))
-    detection_residual[:] = observer.residual_fast
-    if memory_gain > 0.0:
-        observer_step(tool.wrench, memory_gain, wrench)
+    tau_tool, tau_met, tau_met_slow = stack_vector(n), stack_vector(n), stack_vector(n)
+    met = tool.in_contact
+    if mode == FREE:
+        forget_tool_in_contact(met)
+    else:
+        matvec_t_into(J, tool.wrench, tau_tool)
+        follow_tool_in_contact(met, observer.residual_fast - tau_tool, observer.noise, J, step)
+    matvec_t_into(J[:3], met.force, tau_met)
+    matvec_t_into(J[:3], met.force_slow, tau_met_slow)
+    for i in range(n):
+        detection_residual[i] = observer.residual_fast[i] - tau_met[i]
+    wrench = matvec_t_into(J_bar, detection_residual, stack_vector(6))
+    if mode == FREE and not pushed:
+        observer_step(tool.wrench, step.tool_memory_gain, wrench)
+    matvec_t_into(J, tool.wrench, tau_tool)
+    for i in range(n):
+        tool.arm_torque[i] = observer.residual[i] - tau_met_slow[i] - tau_tool[i]
+        tool.arm_torque_fast[i] = detection_residual[i] - tau_tool[i]
     if pushed:
         wrench[:] = tool.wrench
     if pushed or not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
         matvec_t_into(J, wrench, tau_tool)
         for i in range(n):
             detection_residual[i] -= tau_tool[i]
-    matvec_t_into(J, tool.wrench, tau_tool)
-    for i in range(n):
-        tool.arm_torque[i] = observer.residual[i] - tau_tool[i]
-        tool.arm_torque_fast[i] = observer.residual_fast[i] - tau_tool[i]
 
 
 @inlined
@@ -80,13 +93,14 @@ def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Rec
 def follow_tool_force(tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
 
-    While something touches the arm, that is the force of before.
+    While something touches the arm, that is the force of before and what has met the tool since.
     """
     wrench = stack_vector(6)
     if arm.has_wrench != 0:
         wrench[:] = arm.wrench_ee
     elif mode != FREE:
         wrench[:] = tool.wrench
+        wrench[:3] += tool.in_contact.force
     else:
         matvec_t_into(J_bar, residual_fast, wrench)
     observer_step(tool.force, gain, wrench[:3])

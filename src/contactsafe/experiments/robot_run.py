@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactsafe.hardware.ending import Ending
+from contactsafe.hardware.ending import BUSY_EDGES_US, Ending
 from contactsafe.results.experiment import Experiment, Table, Trial
 from contactsafe.results.figures import Figure, Panel
 from contactsafe.results.metrics import CONTACT_N, Aim, Metric
@@ -124,10 +124,21 @@ def _table(runs: Sequence[RobotRun]) -> Table:
     rows += [(name, *(run.figures.get(name, math.nan) for run in runs)) for name in names]
     for label, value in _ENDING.items():
         rows.append((label, *(float(value(run.ending)) for run in runs)))
+    rows += _histogram(runs)
     return Table(
         "runs", "How the runs went", ("figure", *(run.controller for run in runs)), tuple(rows),
         note="Busy: from the robot's state to its command, what the loop takes of a tick.",
     )  # fmt: skip
+
+
+def _histogram(runs: Sequence[RobotRun]) -> list[tuple[str | float, ...]]:
+    """Return in how many ticks of each run the loop was busy for how long."""
+    labels = [f"{start} to {end} µs" for start, end in zip((0, *BUSY_EDGES_US), BUSY_EDGES_US[:-1], strict=False)]
+    labels.append(f"{BUSY_EDGES_US[-2]} µs or more")
+    return [
+        (f"ticks busy for {label}", *(float(run.ending.busy_ticks[k]) for run in runs))
+        for k, label in enumerate(labels)
+    ]
 
 
 _ENDING = {

@@ -6,6 +6,10 @@ import numpy as np
 
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.states import REASONS, STATES, STOPPED, WELL
+from contactsafe.hardware.status import BUSY_BINS
+
+BUSY_EDGES_US = (20, 40, 60, 80, 120, 250, 500, BUSY_BINS)
+"""Of the bins that the busy part of a tick is counted in; the last one holds all that took longer."""
 
 
 @dataclass
@@ -21,6 +25,7 @@ class Ending:
         lost: states of the robot that did not come.
         first_step_nm, largest_step_nm: changes of a torque, in the first command and in any other.
         busy_us: busy part of a tick: median, 99th percentile and most, µs, and ticks over 500 µs.
+        busy_ticks: in how many ticks it was below each of `BUSY_EDGES_US`, and not below the one before.
         recorded: ticks in the log.
         recorder_errno: why it ends early, 0 where it does not.
     """
@@ -37,6 +42,7 @@ class Ending:
     busy_us: tuple[int, int, int, int]
     recorded: int
     recorder_errno: int = 0
+    busy_ticks: tuple[int, ...] = (0,) * len(BUSY_EDGES_US)
 
 
 def ending_of(exchange: Exchange) -> Ending:
@@ -50,4 +56,5 @@ def ending_of(exchange: Exchange) -> Ending:
         STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(status["tick"]),
         int(status["refused"]), int(status["lost"]), float(status["first_step_nm"]), float(status["largest_step_nm"]),
         (median, late, most, int(status["busy"][500:].sum())), int(status["recorded"]), int(status["recorder_errno"]),
+        tuple(int(part.sum()) for part in np.split(status["busy"], BUSY_EDGES_US[:-1])),
     )  # fmt: skip

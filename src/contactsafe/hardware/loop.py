@@ -155,7 +155,7 @@ def _report(c: Record, loop: Record, status: Record) -> None:
     status.target_age, status.refused = loop.tick - gate.of_tick, gate.refused
     v, force, residual = c.output.velocity, c.state.tool_wrench.force, c.output.residual_fast
     status.tool_speed = math.sqrt(dot(v[:3], v[:3]))
-    status.contact_link = (c.output.touched or c.output.link) if c.output.mode != 0 else 0
+    status.contact_link = c.output.link if c.output.mode != 0 else 0
     status.contact_n = math.sqrt(dot(c.output.force, c.output.force))
     status.contact_nm = math.sqrt(dot(residual, residual))
     status.tool_n = math.sqrt(dot(force, force))

@@ -59,14 +59,14 @@ class CharucoTarget:
             raise InvalidInputError(f"target with squares of {1000 * self.square_m:g} mm; give 5 to 500 mm")
 
     @property
-    def size(self) -> tuple[float, float]:
+    def extent(self) -> tuple[float, float]:
         """Of the pattern along x and y, m."""
         return self.columns * self.square_m, self.rows * self.square_m
 
     @property
     def named(self) -> dict[str, np.ndarray]:
         """Outer corners by the letter that is printed beside them, (3,) each, m."""
-        x, y = (edge / 2.0 for edge in self.size)
+        x, y = (edge / 2.0 for edge in self.extent)
         places = {"A": (-x, -y), "B": (x, -y), "C": (-x, y), "D": (x, y)}
         return {letter: np.array([*place, 0.0]) for letter, place in places.items()}
 
@@ -109,7 +109,7 @@ class CharucoTarget:
 
     def _from_opencv(self, places: np.ndarray) -> np.ndarray:
         """Turn OpenCV's places, from the upper left corner downwards, (n, 2) or wider, into the target's, (n, 3)."""
-        width, height = self.size
+        width, height = self.extent
         return np.column_stack([places[:, 0] - width / 2.0, height / 2.0 - places[:, 1], np.zeros(len(places))])
 
 

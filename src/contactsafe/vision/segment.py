@@ -151,8 +151,11 @@ class Segmenter:
 
     def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
-        smooth = cv2.min(cv2.GaussianBlur(darkest, (5, 5), _LINE_BLUR_PX), background)  # between reflections is no line
+        # Beside the arm, and where the picture ends, its pixels are dark by what is beyond: that is no line.
+        seen = cv2.erode(seen, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+        smooth = cv2.min(darkest, background)  # nor is what lies between two reflections
         np.copyto(smooth, background, where=seen == 0)
+        smooth = cv2.bitwise_and(cv2.GaussianBlur(smooth, (5, 5), _LINE_BLUR_PX), seen)
         sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
         hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
         usual, noise = _middle_and_spread(hollow, seen)

@@ -38,7 +38,7 @@ def write_sheet(target: CharucoTarget, path: Path) -> str:
 
 
 def _paper(target: CharucoTarget) -> str:
-    width, height = (1000.0 * edge + 2 * _MARGIN_MM for edge in target.size)
+    width, height = (1000.0 * edge + 2 * _MARGIN_MM for edge in target.extent)
     for name, (long, short) in _PAPER_MM.items():
         if width <= long and height <= short:
             return name
@@ -70,7 +70,7 @@ def _words(target: CharucoTarget, paper: tuple[int, int], said: str) -> list[tup
     for letter, (x, y, _) in target.named.items():
         aside, above = 1000.0 * x + (4.0 if x > 0 else -7.0), 1000.0 * y + (4.0 if y > 0 else -7.0)
         letters.append((aside + paper[0] / 2, above + paper[1] / 2, letter))
-    return [*letters, (paper[0] / 2 - 60.0, paper[1] / 2 - 500.0 * target.size[1] - 8.0, said)]
+    return [*letters, (paper[0] / 2 - 60.0, paper[1] / 2 - 500.0 * target.extent[1] - 8.0, said)]
 
 
 def _pdf(target: CharucoTarget, paper: tuple[int, int], said: str) -> bytes:

@@ -141,3 +141,19 @@ def test_work_begins_with_ink_ends_without_and_needs_sight(arm):
     pictures.age_ms = math.inf
     work.look(seen, np.zeros(6), 0)
     assert work.is_blind()
+
+
+def test_an_arm_that_had_moved_on_since_the_picture_was_ink(arm):
+    """What hides the board is the arm where it was when the picture was taken, not where it is."""
+    shown = Shown(np.full((455, 455, 3), 200, np.uint8))
+    work, postures = WipingWork(shown), []
+    work.prepare(arm, True)
+    solids_at = work._eye.solids_at
+    work._eye.solids_at = lambda q: postures.append(q) or solids_at(q)
+    seen = np.zeros(1, seen_dtype(7))[0]
+    for tick in range(17, 200, 17):
+        seen["q"], seen["tick"] = arm.home + 0.001 * tick, tick
+        shown.number, shown.age_ms = tick, 40.0
+        work.look(seen, np.zeros(6), 0)
+    np.testing.assert_allclose(postures[-1], arm.home + 0.001 * (187 - 40), atol=1e-9)
+    work.close()

@@ -31,7 +31,7 @@ TURNED_RAD = math.radians(20.0)
 _AROUND_M = 0.03
 """By which more than what may be wiped is looked at, on every side."""
 
-ROUND_RAD = math.radians(45.0)
+ROUND_RAD = math.radians(30.0)
 """By which the camera may stand round the board from straight beyond it, where training had it: from further round the
 arm hides what it is about to wipe. What the shipped policy cleans from where is in docs/howto/real_robot.md."""
 

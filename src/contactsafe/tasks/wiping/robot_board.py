@@ -34,6 +34,7 @@ def shown_dtype(board: BoardConfig) -> np.dtype:
             ("ink", np.int64, (_MOST,)),  # cells left
             ("cells", np.uint8, Whiteboard(board).cells.shape),
             ("taken", np.int64, (2,)),  # number of the last two pictures of it, from 1; 0 while one is being drawn
+            ("taken_tick", np.int64, (2,)),  # when they were taken
             ("pictures", np.uint8, (2, HEIGHT, WIDTH, 3)),  # they alternate
         ]
     )

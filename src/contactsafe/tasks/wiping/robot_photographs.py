@@ -40,7 +40,7 @@ _NAP_S = 0.002
 
 
 @dataclass(frozen=True)
-class Sight:
+class Subject:
     """What a software camera is before.
 
     Attributes:
@@ -87,15 +87,15 @@ class Drawing:
     """What the camera sees of the board, and of the arm before it.
 
     Args:
-        sight: as given.
+        subject: as given.
     """
 
-    def __init__(self, sight: Sight):
-        self.shown, self._seed, placed = map_shown(sight.path, sight.board), sight.seed, sight.placed
-        camera = sight.camera if placed is None else camera_over(placed)
-        self._photographer = Photographer(camera, sight.board, build_plant(sight.arm, WorldConfig(fixtures=())))
+    def __init__(self, subject: Subject):
+        self.shown, self._seed, placed = map_shown(subject.path, subject.board), subject.seed, subject.placed
+        camera = subject.camera if placed is None else camera_over(placed)
+        self._photographer = Photographer(camera, subject.board, build_plant(subject.arm, WorldConfig(fixtures=())))
         turned = None if placed is None else turned_from(camera, placed)
-        self._distorted = Distorted(Square(sight.lens, PHOTO_PX, focal_px(camera)), turned)
+        self._distorted = Distorted(Square(subject.lens, PHOTO_PX, focal_px(camera)), turned)
 
     def picture(self, number: int) -> np.ndarray:
         """Return picture number so and so, uint8 (720, 1280, 3), of now."""
@@ -104,11 +104,11 @@ class Drawing:
         return self._distorted.picture(self._photographer.take(shown["cells"], solids, self._seed, number))
 
 
-def draw_pictures(sight: Sight) -> None:
+def draw_pictures(subject: Subject) -> None:
     """Be the camera of a run, in a process of its own, until whoever began it has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_to_one_thread()
-    parent, drawing, number = os.getppid(), Drawing(sight), -1
+    parent, drawing, number = os.getppid(), Drawing(subject), -1
     shown = drawing.shown[0]
     while os.getppid() == parent:
         now = int(shown["tick"]) // _EVERY_TICKS
@@ -116,7 +116,7 @@ def draw_pictures(sight: Sight) -> None:
             time.sleep(_NAP_S)
             continue
         number, slot = now, now % 2
-        shown["taken"][slot] = 0
+        shown["taken"][slot], shown["taken_tick"][slot] = 0, shown["tick"]
         shown["pictures"][slot] = drawing.picture(number)
         shown["taken"][slot] = number + 1
 
@@ -125,13 +125,13 @@ class PhotographedBoard:
     """The camera's pictures of the board of `WipedBoard`.
 
     Args:
-        path, arm, board, camera, seed, placed: as `Sight` has them.
+        path, arm, board, camera, seed, placed: as `Subject` has them.
     """
 
     def __init__(
         self, path: Path, arm: Arm, board: BoardConfig, camera: Camera, seed: int, placed: PlacedCamera | None = None
     ):
-        self._sight = Sight(path, arm, board, camera, seed, placed)
+        self._subject = Subject(path, arm, board, camera, seed, placed)
         self._source: ColourCamera | None = None
         self._process: BaseProcess | None = None
 
@@ -141,20 +141,20 @@ class PhotographedBoard:
         Raises:
             CameraError: its process did not get ready.
         """
-        sight, lens = self._sight, self._sight.lens
-        self._drawing = Drawing(sight) if lockstep else None
-        self._shown, self._view = map_shown(sight.path, sight.board), sight.view()
+        subject, lens = self._subject, self._subject.lens
+        self._drawing = Drawing(subject) if lockstep else None
+        self._shown, self._view = map_shown(subject.path, subject.board), subject.view()
         self._device = SoftwareCamera(lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion)
         self._source = ColourCamera(sensor=self._device.sensor, profile=self._device.profile)
         self._source.open()
-        self._photo, self._number = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1
+        self._photo, self._number, self._tick = np.zeros((PHOTO_PX, PHOTO_PX, 3), np.uint8), -1, 0
         if not lockstep:
             self._begin()
 
     def _begin(self) -> None:
         """Start the process that draws, and wait for its first picture."""
         self._process = process = multiprocessing.get_context("spawn").Process(
-            target=draw_pictures, args=(self._sight,), daemon=True
+            target=draw_pictures, args=(self._subject,), daemon=True
         )
         process.start()
         until = time.monotonic() + _READY_S
@@ -167,16 +167,18 @@ class PhotographedBoard:
         """Return the newest picture; in lockstep it is taken where the time for one has come."""
         number = tick // _EVERY_TICKS if self._drawing else int(self._shown["taken"].max()) - 1
         if number not in (self._number, -1):
-            self._take(number)
-        return self._photo, self._number, float(max(tick - self._number * _EVERY_TICKS, 0))
+            self._take(number, tick)
+        return self._photo, self._number, float(max(tick - self._tick, 0))
 
-    def _take(self, number: int) -> None:
+    def _take(self, number: int, tick: int) -> None:
         """Hand a picture to the device, and take it from there as that of a real one."""
         slot = number % 2
+        taken = tick if self._drawing else int(self._shown["taken_tick"][0, slot])
         picture = self._drawing.picture(number) if self._drawing else self._shown["pictures"][0, slot].copy()
         if not self._drawing and self._shown["taken"][0, slot] != number + 1:
             return  # the next one was drawn into it meanwhile
         self._device.give(picture, number, 1000.0 * number / 30.0)
+        self._tick = taken
         picture, self._number, _ = opened(self._source).newest(_WAIT_MS)
         if picture is not None:
             self._photo = self._view.cut(picture)

@@ -12,6 +12,9 @@ from contactsafe.vision.lens import Lens, Square, View
 
 _WAIT_MS = 200
 
+UNDER_WAY_MS = 33.0
+"""From exposure to arrival: taken for the time between two pictures; it has not been measured on a device."""
+
 
 def focal_px(camera: Camera) -> float:
     """Return the focal length of a photograph, pixels, of the camera that a policy was trained with."""
@@ -58,10 +61,10 @@ class CameraPictures:
         picture, number, age_ms = source.newest()
         if picture is None or age_ms > _WAIT_MS:
             source.look_again()
-            return self._photo, self._number, math.inf if picture is None else age_ms
+            return self._photo, self._number, math.inf if picture is None else age_ms + UNDER_WAY_MS
         if number != self._number:
             self._photo, self._number = self._view.cut(picture), number
-        return self._photo, number, age_ms
+        return self._photo, number, age_ms + UNDER_WAY_MS
 
     def close(self) -> None:
         """Let go of it."""

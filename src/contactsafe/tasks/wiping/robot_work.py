@@ -1,5 +1,6 @@
 """Wiping on a real robot: pictures of the board become masks, as in training, and ink says when there is work."""
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -24,6 +25,9 @@ _CLEAN_LOOKS, _INKED_LOOKS = 20, 6
 
 _BLIND_MS = 150.0
 """The arm is held where the newest picture is older: it has stopped, or the camera is unplugged."""
+
+_REMEMBERED = 30
+"""Postures of the last half second."""
 
 _LEAST_PX = 3
 """A mask of fewer inked pixels shows none."""
@@ -91,6 +95,7 @@ class WipingWork:
         corners = self._eye.corners if self.placed is None else self.placed.corners
         self._segmenter = Segmenter(self._eye.homography, corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
+        self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
         self.pictures.open(lockstep)
 
@@ -101,9 +106,10 @@ class WipingWork:
         """
         del steps
         picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
+        self._past.append((float(seen["tick"]), seen["q"].copy()))
         if number != self._number:
             self._number = number
-            solids = self._eye.solids_at(seen["q"])
+            solids = self._eye.solids_at(self._posture_at(float(seen["tick"]) - self._age_ms))
             hidden = self._eye.hidden(solids) if self._view is None else self._view.hidden(solids)
             self._mask = self._segmenter.segment(picture, hidden)
             shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
@@ -113,6 +119,13 @@ class WipingWork:
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
         return observed
+
+    def _posture_at(self, tick: float) -> np.ndarray:
+        """Return where the joints were when a picture was taken, (n,), rad: the arm in it is where it was then."""
+        ticks, postures = zip(*self._past, strict=True)
+        if not np.isfinite(tick):
+            return postures[-1]
+        return np.array([np.interp(tick, ticks, joint) for joint in np.transpose(postures)])
 
     def is_blind(self) -> bool:
         """Tell whether the camera shows what is past."""
