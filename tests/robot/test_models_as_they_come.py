@@ -197,7 +197,7 @@ def test_key_frame_of_another_name_is_found_by_it_or_its_beginning():
         assert_array_equal(robots.from_mjcf(spec, FLANGE, actuators="torque", home=name).home, [0.0, 1.0, 1.0, 0.0])
     with pytest.raises(InvalidInputError, match=r"home = 're' is none of the key frames 'ready', 'rest'; give one"):
         robots.from_mjcf(spec, FLANGE, actuators="torque", home="re")
-    with pytest.warns(ModelWarning, match=r"home is the middle of the range, since no key frame is called 'home'"):
+    with pytest.warns(ModelWarning, match=r"home is one that was chosen here, since no key frame is called 'home'"):
         robots.from_mjcf(spec, FLANGE, actuators="torque")
 
 

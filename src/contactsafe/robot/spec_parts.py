@@ -62,6 +62,17 @@ def add_flange(spec: mujoco.MjSpec, site: str | Flange) -> str:
     return name
 
 
+def name_all(spec: mujoco.MjSpec) -> None:
+    """Give parts a name where they have none: what is edited is found by its name."""
+    named = {"joint": spec.joints, "body": spec.bodies[1:], "actuator": spec.actuators, "equality": spec.equalities}
+    for kind, things in named.items():
+        taken = {thing.name for thing in things}
+        free = (f"{kind}{i}" for i in range(10**6) if f"{kind}{i}" not in taken)
+        for thing in things:
+            if not thing.name:
+                thing.name = next(free)
+
+
 def become_motor(actuator: Any, force: float) -> None:
     """Make an actuator of an `MjSpec` a motor, force in both directions at its control's unit; inf for no limit."""
     actuator.gaintype, actuator.gainprm = mujoco.mjtGain.mjGAIN_FIXED, [1.0, *9 * (0.0,)]

@@ -13,7 +13,7 @@ from contactsafe.robot.bodies import link_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.missing_meshes import find_meshes
 from contactsafe.robot.names import BODY, JOINT, SITE, find
-from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, remove
+from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, name_all, remove
 from contactsafe.robot.user_chain import choose_chain, is_led, refuse_tied
 from contactsafe.robot.user_limits import torque_limits
 
@@ -79,7 +79,7 @@ def _examine(
     spec: mujoco.MjSpec, site: str | Flange, joints: Sequence[str] | None, tau_max: ArrayLike | None, findings: Findings
 ) -> tuple[str, mujoco.MjModel, list[int], np.ndarray]:
     """Return site, compiled scene, joints and torque limits; parts get names, and missing meshes are taken off."""
-    _name_all(spec)
+    name_all(spec)
     find_meshes(spec, findings)
     findings.raise_problems()
     name = add_flange(spec, site)
@@ -100,17 +100,6 @@ def _edit(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int], limits: 
     steps = round(timestep / model.opt.timestep)
     if steps < 1 or abs(steps * model.opt.timestep - timestep) > 1e-9:
         spec.option.timestep = timestep
-
-
-def _name_all(spec: mujoco.MjSpec) -> None:
-    """Give parts a name where they have none: what is edited is found by its name."""
-    named = {"joint": spec.joints, "body": spec.bodies[1:], "actuator": spec.actuators, "equality": spec.equalities}
-    for kind, things in named.items():
-        taken = {thing.name for thing in things}
-        free = (f"{kind}{i}" for i in range(10**6) if f"{kind}{i}" not in taken)
-        for thing in things:
-            if not thing.name:
-                thing.name = next(free)
 
 
 def _give_motor(spec: mujoco.MjSpec, model: mujoco.MjModel, joint: int, limit: float) -> None:

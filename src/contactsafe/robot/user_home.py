@@ -7,10 +7,17 @@ from numpy.typing import ArrayLike
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import finite_array, finite_range
 from contactsafe.robot.binding import actuators_of
+from contactsafe.robot.bodies import base_bodies, link_of
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.names import JOINT, label, listed
+from contactsafe.robot.names import BODY, JOINT, label, listed
 
 _KEY = mujoco.mjtObj.mjOBJ_KEY
+
+_TRIED, _INNER, _SHARES = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
+"""Postures that are tried, the part of a range at either end that they keep away from, and how far towards them."""
+
+_READY = 0.4
+"""Part of the best readiness from which on a posture will do."""
 
 HOME = "home"
 """The key frame that is taken where none is named."""
@@ -45,7 +52,7 @@ def key_frame(model: mujoco.MjModel, chain: list[int], asked: str | None, findin
         return names.index(prefixed[0])
     if names:
         findings.note(
-            f"home is the middle of the range, since no key frame is called '{HOME}'; of {listed(map(repr, names))} "
+            f"home is one that was chosen here, since no key frame is called '{HOME}'; of {listed(map(repr, names))} "
             "give home='...'"
         )
     return -1
@@ -68,7 +75,7 @@ def at_start(model: mujoco.MjModel, chain: list[int], key: int) -> tuple[mujoco.
 
 
 def checked_home(home: ArrayLike | None, q_min: np.ndarray, q_max: np.ndarray, findings: Findings) -> np.ndarray:
-    """Return a home within the range, (n,), rad: the one given, or the middle of the range."""
+    """Return a home within the range, (n,), rad: the one given, or the middle of the range, see `usual_home`."""
     middle = np.mean(finite_range(q_min, q_max), axis=0)
     if home is None:
         return middle
@@ -82,6 +89,70 @@ def checked_home(home: ArrayLike | None, q_min: np.ndarray, q_max: np.ndarray, f
         i = int(np.argmax(outside))
         findings.problem(f"home[{i}] = {given[i]:g} rad is outside [{q_min[i]:g}, {q_max[i]:g}]; move it inside")
     return given
+
+
+def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel, limits: np.ndarray) -> np.ndarray:
+    """Choose a home where nobody gave one, (n,), rad: a posture from which the arm can work.
+
+    It is the middle of the range where the tool can be moved to all sides there and the motors carry the arm; else the
+    posture next to it, of many at random and those between, the same in every run.
+
+    Args:
+        model: of the scene.
+        chain: the arm's joints.
+        nominal: model of the arm alone.
+        limits: of torque, (n,), N m.
+    """
+    limited = model.jnt_limited[chain].astype(bool)
+    low, high = (np.where(limited, model.jnt_range[chain, end], (-np.pi, np.pi)[end]) for end in (0, 1))
+    middle, n = 0.5 * (low + high), len(chain)
+    rng = np.random.default_rng(0)
+    postures = np.vstack([middle, rng.uniform(low + _INNER * (high - low), high - _INNER * (high - low), (_TRIED, n))])
+    data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
+    for i, q in enumerate(postures):
+        readiness[i] = _readiness(nominal, data, q, limits)
+    ready = _READY * readiness.max()
+    between = [middle + share * (q - middle) for q in postures[readiness >= ready] for share in _SHARES]
+    distance = [float(np.linalg.norm((q - middle) / (high - low))) for q in between]
+    scene = mujoco.MjData(model)
+    for i in np.argsort(distance, kind="stable"):
+        scene.qpos[model.jnt_qposadr[chain]] = between[i]
+        if _readiness(nominal, data, between[i], limits) >= ready and not touching(model, scene, chain):
+            return between[i]
+    return middle
+
+
+def _readiness(nominal: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, limits: np.ndarray) -> float:
+    """Return how far the tool moves at least for a radian of all joints, m; 0 where gravity takes half the torque."""
+    data.qpos[:], data.qvel[:] = q, 0.0
+    mujoco.mj_forward(nominal, data)
+    if (np.abs(data.qfrc_bias) > 0.5 * limits).any():
+        return 0.0
+    return least_reach(nominal, data)
+
+
+def least_reach(nominal: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Return how far the tool moves at least for a radian of all joints, m; a turn moves what is half a metre away."""
+    J = np.zeros((6, nominal.nv))
+    mujoco.mj_jacSite(nominal, data, J[:3], J[3:], 0)
+    J[3:] *= 0.5
+    return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+
+def touching(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> list[str]:
+    """Return the pairs of bodies that touch, of which one is moved by the arm and the other is not alike."""
+    mujoco.mj_fwdPosition(model, data)
+    links, base = link_of(model, chain), base_bodies(model, chain)
+    pairs = []
+    for i in range(data.ncon):
+        contact = data.contact[i]
+        if min(contact.geom1, contact.geom2) < 0:  # a flexible body's
+            continue
+        first, second = sorted(int(model.geom_bodyid[geom]) for geom in (contact.geom1, contact.geom2))
+        apart = links[first] != links[second] or base[first] or base[second]
+        if contact.dist < 0.0 and apart and max(links[first], links[second]) > 0:
+            pairs.append(f"{label(model, BODY, first)} on {label(model, BODY, second)}")
+    return list(dict.fromkeys(pairs))
 
 
 def check_held(

@@ -27,7 +27,7 @@ from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compi
 from contactsafe.robot.surface import geom_surface
 from contactsafe.robot.torque_driven import torque_driven_copy
 from contactsafe.robot.user_chain import choose_chain, refuse_tied, refuse_weightless
-from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame
+from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame, usual_home
 from contactsafe.robot.user_limits import declared_friction, joint_range, rotor, torque_limits, torque_rate
 from contactsafe.robot.user_notes import note_home, note_unserved
 
@@ -48,7 +48,7 @@ class ArmOptions(TypedDict, total=False):
         friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3), in place of the
             file's damping and frictionloss; None for those.
         home: a posture well inside the limits, (n,), rad; or a key frame by its name or how it begins; None for 'home',
-            with the prefix of the joints, or the only key frame, or the middle of the range.
+            with the prefix of the joints, or the only key frame, or what `usual_home` chooses.
         tip: the part of the tool that works, its face centred on the site; None where no part is meant to. It counts in
             simulated worlds alone.
     """
@@ -148,12 +148,15 @@ def _arm(found: Found, options: ArmOptions, findings: Findings) -> Arm:
         wanted = asked if isinstance(asked, str) else None
         key = key_frame(model, chain, wanted, Findings() if asked is not None else findings)
     data, key_home = at_start(model, chain, key)
-    home = checked_home(key_home if asked is None or isinstance(asked, str) else asked, q_min, q_max, findings)
+    given = key_home if asked is None or isinstance(asked, str) else asked
+    home = checked_home(given, q_min, q_max, findings)
     rate = 1.0
     with findings.noting():
         rate = torque_rate(options.get("torque_rate_max"), limits)
     found = found._replace(data=data)
     nominal = _nominal_model(model, data, chain, found.site, limits)
+    if given is None:
+        home = usual_home(model, chain, nominal, limits)
     friction, drag, unknown = _friction(found, limits, nominal, options.get("friction"), findings)
     if np.linalg.norm(nominal.opt.gravity) < _GRAVITY_MAX:  # or the arm is refused for that
         meant = key >= 0 or asked is not None

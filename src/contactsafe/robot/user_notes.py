@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
-from contactsafe.robot.bodies import base_bodies, link_of
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.names import BODY, JOINT, label, listed, several
+from contactsafe.robot.names import JOINT, label, listed, several
 from contactsafe.robot.user_chain import joints_above
+from contactsafe.robot.user_home import least_reach, touching
 
 _MARGIN_RAD, _MARGIN_OF_RANGE = 0.2, 0.25
 """Distance from the end of a range at which the stops of `presets.safe` begin, and at most this part of the range."""
@@ -36,28 +36,12 @@ def note_home(
                 f"its range [{low:.3g}, {high:.3g}], where joint stops push back; give home=[...] further inside"
             )
     data.qpos[model.jnt_qposadr[chain]] = home
-    touching = _touching(model, data, chain)
-    if touching:
+    pairs = touching(model, data, chain)
+    if pairs:
         findings.note(
-            f"at home the arm touches something: {listed(touching)}; that is felt as a contact, so leave out the pair "
+            f"at home the arm touches something: {listed(pairs)}; that is felt as a contact, so leave out the pair "
             "(<contact><exclude .../></contact>), or give another home=[...]"
         )
-
-
-def _touching(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> list[str]:
-    """Return the pairs of bodies that touch, of which one is moved by the arm and the other is not alike."""
-    mujoco.mj_fwdPosition(model, data)
-    links, base = link_of(model, chain), base_bodies(model, chain)
-    pairs = []
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        if min(contact.geom1, contact.geom2) < 0:  # a flexible body's
-            continue
-        first, second = sorted(int(model.geom_bodyid[geom]) for geom in (contact.geom1, contact.geom2))
-        apart = links[first] != links[second] or base[first] or base[second]
-        if contact.dist < 0.0 and apart and max(links[first], links[second]) > 0:
-            pairs.append(f"{label(model, BODY, first)} on {label(model, BODY, second)}")
-    return list(dict.fromkeys(pairs))
 
 
 def note_unserved(
@@ -95,10 +79,8 @@ def note_unserved(
 
 
 def _is_stretched(nominal: mujoco.MjModel, home: np.ndarray) -> bool:
-    """Tell whether the tool cannot be moved in some direction; a turn counts as it moves what is half a metre away."""
-    data, J = mujoco.MjData(nominal), np.zeros((6, nominal.nv))
+    """Tell whether the tool cannot be moved in some direction."""
+    data = mujoco.MjData(nominal)
     data.qpos[:] = home
     mujoco.mj_fwdPosition(nominal, data)
-    mujoco.mj_jacSite(nominal, data, J[:3], J[3:], 0)
-    J[3:] *= 0.5
-    return bool(np.linalg.svd(J, compute_uv=False)[-1] < _SINGULAR)
+    return least_reach(nominal, data) < _SINGULAR
