@@ -1,4 +1,4 @@
-"""Models of files through the battery: loaded by path, compared model by model, refused with the reason in the table."""
+"""Models of files through the battery: loaded by path, compared with the baseline, refused with the reason."""
 
 import math
 from pathlib import Path
