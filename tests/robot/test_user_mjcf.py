@@ -208,7 +208,7 @@ def test_joints_of_an_arm_without_motors_are_named_and_limited_by_the_caller():
     assert_array_equal(arm.tau_max, 5.0)
     with pytest.raises(InvalidInputError) as caught:
         arm.bind(bare, tick_s=0.002)
-    assert str(caught.value) == """joint 'a' has no motor; add <motor joint="a"/> to <actuator>"""
+    assert str(caught.value) == """joints 'a', 'b' have no motor; add <motor joint="a"/> to <actuator>"""
 
 
 MOTOR_A = '<motor joint="a" ctrlrange="-5 5" gear="3" armature="0.002"/>'
@@ -284,7 +284,7 @@ def test_missing_and_broken_files_are_refused(tmp_path):
     with pytest.raises(InvalidInputError) as caught:
         robots.from_mjcf(Path("nowhere.xml"), site="tip")
     assert str(caught.value) == (
-        "no file at 'nowhere.xml'; give the path of an MJCF file, or a compiled mujoco.MjModel"
+        "no file at 'nowhere.xml'; give the path of an MJCF file, a mujoco.MjSpec, or a compiled mujoco.MjModel"
     )
     with pytest.raises(InvalidInputError, match=r"^no file at '<mujoco>.{1,80}'; give the path"):
         robots.from_mjcf("<mujoco>" + 500 * "<worldbody/>" + "</mujoco>", site="tip")
@@ -301,12 +301,13 @@ def test_missing_and_broken_files_are_refused(tmp_path):
         (
             [MOTOR_A, '<position joint="a" kp="10"/>'],
             "actuator 0 (without a name) of joint 'a' is no motor, which turns its control into torque and nothing "
-            """else; replace it by <motor joint="a"/>""",
+            """else; replace it by <motor joint="a"/>, or edit the scene's MjSpec with """
+            "robots.make_torque_driven(spec, 'tip')",
         ),
         (
             ["<worldbody>", '<option timestep="0.0007"/><worldbody>'],
-            "the model's timestep of 0.0007 s does not divide the controller's tick of 0.001 s; "
-            """set <option timestep="0.001"/>""",
+            "the model's timestep of 0.0007 s does not divide the controller's tick of 0.002 s; "
+            """set <option timestep="0.002"/>""",
         ),
         (['name="b"', 'name="c"', 'joint="b"', 'joint="c"'], "joint 'b' is not in the model; give one of: a, c"),
     ],
@@ -315,7 +316,7 @@ def test_missing_and_broken_files_are_refused(tmp_path):
 def test_model_that_the_arm_cannot_be_bound_to_is_refused(replacements, text):
     arm = robots.from_mjcf(mujoco.MjModel.from_xml_string(ELBOW), site="tip")
     with pytest.raises(InvalidInputError) as caught:
-        arm.bind(edited(ELBOW, *replacements))
+        arm.bind(edited(ELBOW, *replacements), tick_s=0.002)
     assert str(caught.value) == text
 
 

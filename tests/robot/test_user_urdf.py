@@ -76,5 +76,5 @@ def test_a_file_that_is_not_there_is_told(tmp_path):
 
 def test_a_joint_without_effort_needs_a_torque_limit(file):
     file.write_text(file.read_text(encoding="utf-8").replace('effort="87.0"', 'effort="0"'), encoding="utf-8")
-    with pytest.raises(InvalidInputError, match=r"joint 'joint1' has no actuator"):
+    with pytest.raises(InvalidInputError, match=r"joints 'joint1', .* have no torque limit; give tau_max=\[...\], 7"):
         robots.from_urdf(file, "tcp")

@@ -53,4 +53,4 @@ def _described(robot: str, tool: str, site: str | None) -> Arm:
         raise InvalidInputError(f"{path.name} has end-effector points of its own; say which, --site NAME")
     if path.suffix.lower() == ".urdf":
         return robots.from_urdf(str(path), site)
-    return robots.from_mjcf(str(path), site)
+    return robots.from_mjcf(str(path), site, actuators="torque")  # with servos too: nothing is driven here

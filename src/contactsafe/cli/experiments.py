@@ -83,6 +83,7 @@ class Options:
         plants: collisions with an arm and sensors that have errors (real), without any (clean), or both side by side.
         sensors: of an arm that has errors: encoders of 19 bit alone, or a Franka's torque sensors and noisy velocity.
         minutes: simulated time in which detection counts false alarms.
+        models: arms of model files, each PATH of an MJCF, or PATH:TOOL with a site, body or URDF link.
         out: folder for report.html, summary.json and the trials as NAME.csv.
         json: print tables, spreads and trials as JSON instead of text.
         bundle: folder of another policy.
@@ -97,6 +98,7 @@ class Options:
     plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS
     sensors: Annotated[str, one_of(SENSORS)] = ExperimentConfig.sensors
     minutes: float = ExperimentConfig.minutes
+    models: tuple[str, ...] = ()
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None
     json: bool = False
     bundle: BundleFolder = None
@@ -152,6 +154,7 @@ def _config(asked: Options, entry: Entry) -> ExperimentConfig:
         asked.plants,
         asked.sensors,
         asked.minutes,
+        asked.models,
         scenes,
         bundle,
         arm_for(known, robots.panda),
@@ -204,6 +207,8 @@ def _command(
     words += sensors_words(config.sensors)
     if config.minutes != ExperimentConfig.minutes:
         words += ["--minutes", f"{config.minutes:g}"]
+    if config.models:
+        words += ["--models", *config.models]
     return shlex.join(words)
 
 

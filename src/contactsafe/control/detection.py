@@ -42,10 +42,10 @@ def set_thresholds(
 ) -> None:
     """Set each joint's threshold: δ plus what may be wrong with the model of the arm.
 
-    Added are fractions of the friction, unless it lies before a sensor of torque, and of the inertial torque; how far a
-    command may have changed since the motors took it over; the change of the tool's wrench since it was measured last;
-    a multiple of the standard deviation of the gravity torque that is not identified yet, and of noise that no filter
-    keeps down.
+    Added are a fraction of the friction and what the model does not know of it, unless it lies before a sensor of
+    torque; a fraction of the inertial torque; how far a command may have changed since the motors took it over; the
+    change of the tool's wrench since it was measured last; a multiple of the standard deviation of the gravity torque
+    that is not identified yet, and of noise that no filter keeps down.
 
     Args:
         detection: `detection_dtype` record; its thresholds are set.
@@ -61,6 +61,8 @@ def set_thresholds(
     for i in range(CT_qd.shape[0]):
         inertial = abs(observer.momentum_rate[i]) + abs(CT_qd[i])
         uncertainty = before_sensor * abs(friction[i] - params.arm.drag[i, 1]) + known.inertia_uncertainty * inertial
+        if arm.has_torque == 0:
+            uncertainty += params.arm.friction_unknown[i, 0] * abs(arm.qd[i]) + params.arm.friction_unknown[i, 1]
         uncertainty += known.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
         detection.model_uncertainty[i] = uncertainty
         detection.threshold[i] = known.residual_threshold + uncertainty + GRAVITY_SIGMAS * gravity_sigma[i]

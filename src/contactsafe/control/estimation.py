@@ -167,7 +167,9 @@ def _has_unknown_load(c: Record) -> bool:
         torque += dot(dynamics.J[:, i], state.arm.wrench_ee)
     row = load_regressor_into(dynamics, gravity, i, stack_vector(4))
     uncertainty = state.detection.model_uncertainty[i]
-    dry_friction = 0.0 if state.arm.has_torque != 0 else c.params.arm.friction[i, 0] + c.params.arm.drag[i, 2]
+    known = c.params.arm
+    dry = known.friction[i, 0] + max(known.drag[i, 2], known.friction_unknown[i, 1])
+    dry_friction = 0.0 if state.arm.has_torque != 0 else dry
     identify_payload(payload, row, torque, uncertainty, dry_friction, dt, known_kg)
     return load_sags(payload, c.output.error, dynamics.velocity, gravity, known_kg, dt)
 

@@ -61,7 +61,8 @@ def arm_dtype(n: int) -> np.dtype:
     return np.dtype(
         [(name, _f, (n,)) for name in ("q_min", "q_max", "qd_max", "tau_max", "runaway_speed", "reversal_s")]
         + [(name, _f, (n,)) for name in ("q_least", "q_most", "qd_most")]  # that are believed of a measurement
-        + [("friction", _f, (n, 3)), ("drag", _f, (n, 3)), ("sensor_friction", _f, (n, 3)), ("sensor_drag", _f, (n, 3))]
+        + [("friction", _f, (n, 3)), ("drag", _f, (n, 3)), ("friction_unknown", _f, (n, 2))]
+        + [("sensor_friction", _f, (n, 3)), ("sensor_drag", _f, (n, 3))]
         + [("sensor_errs", np.int64)]  # 1 where the sensors of torque show something beside it
         + [("rotor", _f, (n,)), ("lever_doubted", _f)]  # kg m², m
     )
@@ -128,7 +129,7 @@ def _fill_arm(limits: np.void, config: ControllerConfig, arm: Arm) -> None:
     # From full drive to full braking of all that may drive a joint, and the lag of what is measured.
     limits["reversal_s"] = 2.0 * arm.tau_max.max() / arm.torque_rate_max + 10.0 * config.clock.loop_delay_s
     limits["tau_max"], limits["friction"], limits["lever_doubted"] = arm.tau_max, arm.friction, arm.lever_doubted
-    limits["drag"] = arm.drag
+    limits["drag"], limits["friction_unknown"] = arm.drag, arm.friction_unknown
     limits["sensor_friction"], limits["sensor_drag"] = arm.sensor_friction, arm.sensor_drag
     limits["sensor_errs"] = bool(np.any(arm.sensor_friction[:, 0]) or np.any(arm.sensor_drag))
     limits["rotor"] = arm.model.dof_armature

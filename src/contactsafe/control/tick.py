@@ -28,6 +28,7 @@ from contactsafe.control.estimation import (
 from contactsafe.control.impedance import (
     compose_into,
     follow_gains,
+    overcome_stiction,
     posture_torques_into,
     set_joint_damping,
     task_wrenches,
@@ -125,6 +126,8 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
         impedance, arm, target.q_posture, state.reaction.posture_scale, params, elastic_posture, damping_posture
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
+    if params.impedance.friction_compensation != 0:
+        overcome_stiction(elastic, arm.qd, params.arm)
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
     follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain)
     scale, reason = contact_bound.tool_task_scale(

@@ -16,6 +16,7 @@ import tempfile
 import time
 
 import llvmlite
+import mujoco
 import numba
 import numpy as np
 
@@ -40,8 +41,9 @@ _HANDED_DOWN = "CONTACTSAFE_PRIVATE_CACHE"
 
 
 def _digest() -> str:
-    """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy."""
-    fingerprint = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    """Fingerprint what compiled code depends on: the rooms that compile, numba, llvmlite, NumPy, MuJoCo."""
+    versions = (numba.__version__, llvmlite.__version__, np.__version__, mujoco.__version__)
+    fingerprint = hashlib.sha256(" ".join(versions).encode())
     root = pathlib.Path(__file__).parents[1]
     for path in (path for room in _ROOMS for path in sorted((root / room).rglob("*.py"))):
         fingerprint.update(path.read_bytes())

@@ -11,6 +11,10 @@ class InvalidInputError(ContactSafeError, ValueError):
     """A value given by the user has the wrong shape, is not finite, or lies outside its range."""
 
 
+class ModelWarning(UserWarning):
+    """Something about a robot model works otherwise than its user might think."""
+
+
 class UnreachableError(ContactSafeError):
     """No joint configuration within the limits reaches the asked pose."""
 

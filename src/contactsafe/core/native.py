@@ -7,6 +7,7 @@ and MjData's arrays are seen through `view1`/`view2` at addresses read from NumP
 
 import pathlib
 import sys
+from typing import Any
 
 import llvmlite.binding
 import mujoco
@@ -17,17 +18,26 @@ from contactsafe.core.arrays import Matrix, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.errors import UnsupportedVersionError
 
-SUPPORTED_MUJOCO = (4000000, 4001000)
-"""Half-open range of `mujoco.mj_version()` whose native interface the tests have seen."""
+SUPPORTED_MUJOCO = ((3, 3), (4, 1))
+"""Half-open range of MuJoCo's versions whose native interface the tests have seen."""
+
+
+def _version() -> tuple[int, int]:
+    """Return major and minor number of the C library; `mj_version` counts otherwise before 3.5 than after."""
+    major, minor = mujoco.mj_versionString().split(".")[:2]
+    return int(major), int(minor)
+
+
+MUJOCO = _version()
 
 
 def _load_library() -> pathlib.Path:
-    found = mujoco.mj_version()
+    found = _version()
     low, high = SUPPORTED_MUJOCO
     if not low <= found < high:
         raise UnsupportedVersionError(
-            f"mujoco {mujoco.__version__} is installed; contactsafe calls MuJoCo natively and was "
-            "checked with 4.0 only; run: pip install 'mujoco>=4.0,<4.1'"
+            f"mujoco {mujoco.mj_versionString()} is installed; contactsafe calls MuJoCo natively and was "
+            "checked with 3.3 to 4.0; run: pip install 'mujoco>=3.3,<4.1'"
         )
     libraries = sorted(pathlib.Path(mujoco.__file__).parent.glob("*mujoco*.so*")) or sorted(
         pathlib.Path(mujoco.__file__).parent.glob("libmujoco*.dylib")
@@ -56,8 +66,9 @@ _pp = (types.uintp, types.uintp)
 mj_kinematics = types.ExternalFunction("mj_kinematics", types.void(*_pp))
 mj_comPos = types.ExternalFunction("mj_comPos", types.void(*_pp))
 mj_comVel = types.ExternalFunction("mj_comVel", types.void(*_pp))
-mj_crb = types.ExternalFunction("mj_crb", types.void(*_pp))
-mj_fullM = types.ExternalFunction("mj_fullM", types.void(*_pp, types.CPointer(types.float64)))
+_composite_inertia = "mj_makeM" if MUJOCO < (3, 10) and hasattr(mujoco, "mj_makeM") else "mj_crb"
+mj_crb = types.ExternalFunction(_composite_inertia, types.void(*_pp))
+"""Composite inertia; where 3.3 to 3.9 have `mj_makeM`, `mj_crb` alone leaves unfilled what `mj_fullM` unpacks."""
 mj_rne = types.ExternalFunction("mj_rne", types.void(*_pp, types.intc, types.CPointer(types.float64)))
 mj_jacSite = types.ExternalFunction(
     "mj_jacSite", types.void(*_pp, types.CPointer(types.float64), types.CPointer(types.float64), types.intc)
@@ -69,6 +80,28 @@ mj_jac = types.ExternalFunction(
     ),
 )
 mj_step = types.ExternalFunction("mj_step", types.void(*_pp))
+
+_double = types.CPointer(types.float64)
+if MUJOCO >= (3, 10):
+    _mj_fullM = types.ExternalFunction("mj_fullM", types.void(*_pp, _double))
+
+    @compiled(inline="always")
+    def full_inertia(model: int, data: int, packed: int, out: Any) -> None:
+        """Fill the joint inertia, (nv, nv), that `mj_crb` has left in MjData; `packed` is not needed."""
+        _mj_fullM(model, data, out)
+
+else:
+    _mj_fullM_packed = types.ExternalFunction("mj_fullM", types.void(types.uintp, _double, types.uintp))
+
+    @compiled(inline="always")
+    def full_inertia(model: int, data: int, packed: int, out: Any) -> None:
+        """Fill the joint inertia, (nv, nv), from the packed one of `packed_inertia`."""
+        _mj_fullM_packed(model, out, packed)
+
+
+def packed_inertia(data: mujoco.MjData) -> int:
+    """Return the address of MjData's packed inertia, which MuJoCo up to 3.9 unpacks; 0 from then on."""
+    return int(data.qM.ctypes.data) if MUJOCO < (3, 10) else 0
 
 
 @intrinsic

@@ -24,7 +24,7 @@ PLANTS = ("real", "clean")
 Progress = Callable[[int], object]
 """Told how many trials were just done."""
 
-Taken = Literal["task", "bundle", "plants", "sensors", "minutes"]
+Taken = Literal["task", "bundle", "plants", "sensors", "minutes", "models"]
 """A field of `ExperimentConfig`, and an option of the command line, that not every experiment takes."""
 
 
@@ -40,6 +40,7 @@ class ExperimentConfig:
         sensors: of an arm that has errors, one of `SENSORS`: 19-bit encoders alone, or a Franka's torque sensors and
             its velocity with more noise.
         minutes: simulated time in which detection counts false alarms, min.
+        models: of arms, for the experiment on them: PATH of an MJCF or URDF, or PATH:TOOL.
         task: for experiments that run one.
         bundle: policy, for experiments that run one.
         arm: that moves by a script, in experiments that run no task.
@@ -52,6 +53,7 @@ class ExperimentConfig:
     plants: tuple[str, ...] = PLANTS
     sensors: str = USUAL
     minutes: float = 60.0
+    models: tuple[str, ...] = ()
     task: ExperimentTask | None = None
     bundle: Bundle | None = None
     arm: Arm = field(default_factory=robots.panda)

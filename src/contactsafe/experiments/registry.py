@@ -3,6 +3,7 @@
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import (
     adversarial,
+    any_arm,
     clock,
     collisions,
     detection,
@@ -29,6 +30,7 @@ ENTRIES: dict[str, Entry] = {
         localisation.ENTRY,
         adversarial.ENTRY,
         clock.ENTRY,
+        any_arm.ENTRY,
     )
 }
 

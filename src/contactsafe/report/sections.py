@@ -76,6 +76,7 @@ def _section(experiment: Experiment, names: Sequence[str], plotter: Plotter) -> 
             f"<h2>{escape(experiment.title)}</h2>",
             f'<p class="question">{escape(experiment.question)}</p>',
             _film(experiment),
+            strip.gallery(experiment.portraits),
             *(_figure(experiment, figure, plotter) for figure in experiment.figures),
             *(html_tables.plain(own) for own in experiment.tables),
             f"<h3>All figures</h3>{html_tables.table([experiment], names)}" if experiment.trials else "",

@@ -1,5 +1,6 @@
 """Picture strips: a few moments of every run, for paper and for browsers without scripts."""
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -9,7 +10,8 @@ from contactsafe.report.film import first_contact, force
 from contactsafe.report.html_tables import coloured
 from contactsafe.report.scene import fit, picture
 from contactsafe.results.experiment import Experiment
-from contactsafe.results.recording import Recording, Stage
+from contactsafe.results.recording import Portrait, Recording, Stage
+from contactsafe.sim.truth import trace_dtype
 
 WIDTH, HEIGHT = 220, 220
 """Of one picture, px."""
@@ -23,6 +25,25 @@ def strips(experiment: Experiment, stage: Stage) -> str:
         stage: arm, tool and surface.
     """
     return "\n".join(_strip(name, data.recorded(experiment, name), stage) for name in data.scenarios(experiment))
+
+
+def gallery(portraits: Sequence[Portrait]) -> str:
+    """Return a picture of each arm, named; nothing where there is none."""
+    return "".join(_portrait(portrait) for portrait in portraits)
+
+
+def _portrait(portrait: Portrait) -> str:
+    n, at = len(portrait.q), np.zeros(3) if portrait.sphere is None else portrait.sphere
+    trace = np.zeros(1, trace_dtype(n))
+    trace["q"], trace["obstacle_position"][:, 0] = portrait.q, at
+    sphere = None if portrait.sphere is None else (portrait.radius, 0.0)
+    still = Recording(portrait.name, "", 0, trace, sphere)
+    image = picture(portrait.stage, fit(portrait.stage, [still]), still, 0, WIDTH, HEIGHT)
+    name = escape(portrait.name)
+    return (
+        f'<figure class="portrait strip"><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{name}">{image}'
+        f"</svg><figcaption>{name}</figcaption></figure>"
+    )
 
 
 def moments(recordings: list[Recording]) -> list[int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactsafe.results.figures import Figure
 from contactsafe.results.metrics import Highlight, Metric
-from contactsafe.results.recording import Recording, Stage
+from contactsafe.results.recording import Portrait, Recording, Stage
 from contactsafe.results.spread import Spread, spread
 
 
@@ -74,6 +74,7 @@ class Experiment:
         figures: which of their curves are plotted.
         stage: on which they are filmed; None for no film.
         tables: what else there is to say.
+        portraits: of arms, where it has several.
         policy: what the learned policy does, in a sentence; empty where none acts.
     """
 
@@ -87,6 +88,7 @@ class Experiment:
     figures: tuple[Figure, ...] = ()
     stage: Stage | None = None
     tables: tuple[Table, ...] = ()
+    portraits: tuple[Portrait, ...] = ()
     policy: str = ""
 
     def spreads(self) -> dict[str, dict[str, dict[str, Spread]]]:

@@ -57,6 +57,25 @@ class Stage:
     colours: Mapping[int, Colour] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Portrait:
+    """One picture of an arm that stands still, and of a sphere that it is going to meet.
+
+    Attributes:
+        name: what is written beneath.
+        stage: the arm, its tool and the floor.
+        q: joint positions, (n,), rad.
+        sphere: its centre, world, (3,), m; None without one.
+        radius: of it, m.
+    """
+
+    name: str
+    stage: Stage
+    q: np.ndarray
+    sphere: np.ndarray | None = None
+    radius: float = 0.0
+
+
 def level_rectangle(centre: tuple[float, float, float], size: tuple[float, float]) -> tuple:
     """Return the corners of a level rectangle as `Stage` has them.
 

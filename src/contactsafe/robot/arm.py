@@ -67,8 +67,10 @@ class Arm(Independent):
         friction: φ1, φ2, φ3 of every joint, (n, 3); zeros where unknown.
         home: a posture well inside the limits, (n,), rad.
         drag: viscous friction N m s/rad, constant torque N m and dry friction N m beside `friction`, (n, 3).
-        sensor_friction, sensor_drag: of the same form, what torque sensors behind the gears show beside the torque that
-            drives the links, (n, 3) each: a bias, hysteresis. By default nothing.
+        friction_unknown: friction that the model does not know, viscous N m s/rad and dry N m, (n, 2): detection
+            allows for it, at rest too. By default nothing.
+        sensor_friction, sensor_drag: what torque sensors behind the gears show beside the torque at the links, of the
+            same form as friction and drag, (n, 3) each: a bias, hysteresis. By default nothing.
         description: what the model was generated from, or for a user's own what was derived from it; None where
             nobody says.
         tool: what the flange carries; None likewise.
@@ -100,6 +102,7 @@ class Arm(Independent):
     lever_doubted: float = 0.0
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, SURFACE_COLUMNS)))
     drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    friction_unknown: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     calibrated: bool = False
@@ -108,9 +111,9 @@ class Arm(Independent):
         """Take numbers as arrays, and refuse what no arm can be."""
         if len(self.places) == 0:
             object.__setattr__(self, "places", touchable(self.surface, self.tool))
-        for name in ("drag", "sensor_friction", "sensor_drag"):
+        for name, columns in (("drag", 3), ("friction_unknown", 2), ("sensor_friction", 3), ("sensor_drag", 3)):
             if np.size(getattr(self, name)) == 0:
-                object.__setattr__(self, name, np.zeros((self.n, 3)))
+                object.__setattr__(self, name, np.zeros((self.n, columns)))
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
         refuse_unsound(self)

@@ -7,7 +7,8 @@ import mujoco
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.names import ACTUATOR, JOINT, find, label, listed
+from contactsafe.robot.findings import Findings
+from contactsafe.robot.names import ACTUATOR, JOINT, find, label, listed, several
 from contactsafe.robot.wrist import Wrist, WristNames, find_wrist
 
 
@@ -48,22 +49,40 @@ def bind_joints(
     names: Sequence[str], site: str, model: mujoco.MjModel, tick_s: float, wrist: WristNames | None
 ) -> Binding:
     """Find joints, their motors and the sensors at the wrist in a model; see `Arm.bind`."""
+    findings, motors = Findings(), list[int | None]()
     joints = [find(model, JOINT, name) for name in names]
-    motors = [_motor_of(model, joint) for joint in joints]
+    for joint in joints:
+        with findings.noting():
+            motors.append(actuator_of(model, joint))
+    bare = [joint for joint in joints if not actuators_of(model, joint)]
+    if bare:
+        remedy = f"""add <motor joint="{mujoco.mj_id2name(model, JOINT, bare[0])}"/> to <actuator>"""
+        findings.problem(f"{several(model, JOINT, bare)} no motor; {remedy}")
+    with findings.noting():
+        _refuse_servos(model, [motor for motor in motors if motor is not None], site)
     steps = round(tick_s / model.opt.timestep)
     if steps < 1 or abs(steps * model.opt.timestep - tick_s) > 1e-9:
-        raise InvalidInputError(
+        findings.problem(
             f"the model's timestep of {model.opt.timestep:g} s does not divide the controller's tick of {tick_s:g} s; "
             f'set <option timestep="{tick_s:g}"/>'
         )
+    findings.raise_problems()
+    driven = [motor for motor in motors if motor is not None]
     return Binding(
         qpos=model.jnt_qposadr[joints].astype(int),
         dof=model.jnt_dofadr[joints].astype(int),
-        ctrl=model.actuator_ctrladr[motors].astype(int),
-        gear=np.array([torque_per_control(model, motor) for motor in motors]),
+        ctrl=controls_of(model, driven),
+        gear=np.array([torque_per_control(model, motor) for motor in driven]),
         steps=steps,
         wrist=_wrist(model, names[-1], site, wrist),
     )
+
+
+def controls_of(model: mujoco.MjModel, motors: list[int]) -> np.ndarray:
+    """Return where the controls of actuators of one control each are in `MjData.ctrl`, (n,)."""
+    if hasattr(model, "actuator_ctrladr"):
+        return model.actuator_ctrladr[motors].astype(int)
+    return np.array(motors, dtype=int)  # before MuJoCo 3.11 every actuator had one
 
 
 def _wrist(model: mujoco.MjModel, last_joint: str, site: str, names: WristNames | None) -> Wrist | str:
@@ -76,15 +95,20 @@ def _wrist(model: mujoco.MjModel, last_joint: str, site: str, names: WristNames 
         return str(error)
 
 
+def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
+    """Find all actuators that work on a joint."""
+    on_joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    works = np.isin(model.actuator_trntype, on_joints) & (model.actuator_trnid[:, 0] == joint)
+    return [int(actuator) for actuator in np.flatnonzero(works)]
+
+
 def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
     """Find the actuator that works on a joint; None where there is none.
 
     Raises:
         InvalidInputError: there are several.
     """
-    on_joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    works = np.isin(model.actuator_trntype, on_joints) & (model.actuator_trnid[:, 0] == joint)
-    found = [int(actuator) for actuator in np.flatnonzero(works)]
+    found = actuators_of(model, joint)
     if len(found) > 1:
         names = listed(label(model, ACTUATOR, actuator) for actuator in found)
         raise InvalidInputError(
@@ -104,14 +128,15 @@ def torque_per_control(model: mujoco.MjModel, actuator: int) -> float:
     return float(model.actuator_gainprm[actuator, 0] * model.actuator_gear[actuator, 0]) if is_motor else 0.0
 
 
-def _motor_of(model: mujoco.MjModel, joint: int) -> int:
-    name = mujoco.mj_id2name(model, JOINT, joint)
-    actuator = actuator_of(model, joint)
-    if actuator is None:
-        raise InvalidInputError(f"""joint '{name}' has no motor; add <motor joint="{name}"/> to <actuator>""")
-    if torque_per_control(model, actuator) == 0.0:
-        raise InvalidInputError(
-            f"actuator {label(model, ACTUATOR, actuator)} of joint '{name}' is no motor, which turns its control into "
-            f"""torque and nothing else; replace it by <motor joint="{name}"/>"""
-        )
-    return actuator
+def _refuse_servos(model: mujoco.MjModel, actuators: list[int], site: str) -> None:
+    servos = [actuator for actuator in actuators if torque_per_control(model, actuator) == 0.0]
+    if not servos:
+        return
+    joint = mujoco.mj_id2name(model, JOINT, model.actuator_trnid[servos[0], 0])
+    one = f"actuator {label(model, ACTUATOR, servos[0])} of joint '{joint}' is no motor, which turns its"
+    if len(servos) > 1:
+        one = f"actuators {listed(label(model, ACTUATOR, servo) for servo in servos)} are no motors, which turn their"
+    raise InvalidInputError(
+        f'{one} control into torque and nothing else; replace it by <motor joint="{joint}"/>, or edit the scene\'s '
+        f"MjSpec with robots.make_torque_driven(spec, '{site}')"
+    )

@@ -41,9 +41,10 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
             f"the calibration is of '{known.robot}' with {known.n} joints, the arm is '{arm.name}' with {arm.n}; "
             "give that of this robot"
         )
-    model, friction, drag = copy.deepcopy(arm.model), arm.friction, arm.drag
+    model, friction, drag, unknown = copy.deepcopy(arm.model), arm.friction, arm.drag, arm.friction_unknown
     if known.losses is not None:
         friction, drag = known.losses.friction, known.losses.drag
+        unknown = unknown * (0.0, 1.0)  # at rest dry friction may still be anything
     if known.rotor is not None:
         model.dof_armature[:] = known.rotor
     load = known.payload if known.payload is not None and known.tool == tool_name(arm) else None
@@ -56,6 +57,7 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
         model=model,
         friction=friction,
         drag=drag,
+        friction_unknown=unknown,
         sensor_friction=arm.sensor_friction if sensor is None else sensor.friction,
         sensor_drag=arm.sensor_drag if sensor is None else sensor.drag,
         description=description,

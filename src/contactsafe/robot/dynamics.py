@@ -13,13 +13,14 @@ from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.linalg import cross_into, dot, matvec_into, spd_inverse
 from contactsafe.core.native import (
+    full_inertia,
     mj_comPos,
     mj_comVel,
     mj_crb,
-    mj_fullM,
     mj_jacSite,
     mj_kinematics,
     mj_rne,
+    packed_inertia,
     view1,
     view2,
 )
@@ -31,7 +32,10 @@ _VIEWED = (
 )  # fmt: skip
 
 handle_dtype = np.dtype(
-    [(name, np.uintp) for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "surface", "places")]
+    [
+        (name, np.uintp)
+        for name in ("model", "data", *_VIEWED, "body_subtreemass", "body_mass", "surface", "places", "packed_inertia")
+    ]
     + [
         ("surface_points", np.int64),
         ("place_points", np.int64),  # of links and tool
@@ -82,6 +86,7 @@ def make_handle(
     handle["surface"], handle["surface_points"] = surface.ctypes.data, len(surface)
     handle["places"], handle["place_points"] = places.ctypes.data, len(places)
     handle["tool_places"] = np.count_nonzero(places[:, 0] == 0.0)
+    handle["packed_inertia"] = packed_inertia(data)
     handle["body_mass"] = model.body_mass.ctypes.data
     handle["body_subtreemass"] = model.body_subtreemass.ctypes.data
     site_id = model.site(site).id
@@ -239,7 +244,7 @@ def update_dynamics(handle: Record, q: Vector, qd: Vector, out: Record) -> bool:
     _set_configuration(handle, q)
     mj_comVel(handle.model, handle.data)
     mj_crb(handle.model, handle.data)
-    mj_fullM(handle.model, handle.data, out.M.ctypes)
+    full_inertia(handle.model, handle.data, handle.packed_inertia, out.M.ctypes)
     mj_rne(handle.model, handle.data, 0, out.c.ctypes)
     _gravity(handle, n, out.g)
     for i in range(n):

@@ -7,7 +7,7 @@ import mujoco
 from contactsafe.core.errors import InvalidInputError
 
 JOINT, SITE, ACTUATOR = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_ACTUATOR
-SENSOR = mujoco.mjtObj.mjOBJ_SENSOR
+SENSOR, BODY = mujoco.mjtObj.mjOBJ_SENSOR, mujoco.mjtObj.mjOBJ_BODY
 _LISTED = 12  # names that a message lists
 
 
@@ -20,7 +20,9 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
     found = mujoco.mj_name2id(model, kind, str(name))
     if found < 0:
         word = kind.name.removeprefix("mjOBJ_").lower()
-        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.nactuator, SENSOR: model.nsensor}[kind]
+        count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.actuator_trntype.size, SENSOR: model.nsensor}[
+            kind
+        ]
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
         raise InvalidInputError(f"{word} '{name}' is not in the model; give one of: {listed(filter(None, names))}")
     return found
@@ -30,6 +32,20 @@ def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
     """Name a thing for a message: by its name, or by its number where it has none."""
     name = mujoco.mj_id2name(model, kind, number)
     return f"'{name}'" if name else f"{number} (without a name)"
+
+
+def several(
+    model: mujoco.MjModel, kind: mujoco.mjtObj, numbers: list[int], has: str = "has", have: str = "have"
+) -> str:
+    """Begin a sentence on one thing or several: "joint 'a' has", "joints 'a', 'b' have"."""
+    word = kind.name.removeprefix("mjOBJ_").lower()
+    names = listed(label(model, kind, number) for number in numbers)
+    return f"{word} {names} {has}" if len(numbers) == 1 else f"{word}s {names} {have}"
+
+
+def numbered(values: Iterable[float]) -> str:
+    """Write numbers for a message."""
+    return ", ".join(f"{value:.4g}" for value in values)
 
 
 def listed(names: Iterable[object]) -> str:

@@ -8,13 +8,16 @@ from contactsafe.robot.description import Tip, Tool
 from contactsafe.robot.fr3 import FR3
 from contactsafe.robot.franka import FLANGE, HAND, WIPER
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.user_mjcf import from_mjcf
+from contactsafe.robot.spec_parts import Flange
+from contactsafe.robot.torque_driven import make_torque_driven
+from contactsafe.robot.urdf_file import urdf_spec
+from contactsafe.robot.user_mjcf import ArmOptions, from_mjcf
 from contactsafe.robot.user_urdf import from_urdf
 from contactsafe.robot.wrist import WristNames
 
 __all__ = [
-    "FLANGE", "HAND", "WIPER", "Calibration", "Tip", "Tool", "WristNames", "calibrated", "fr3", "from_mjcf",
-    "from_urdf", "panda",
+    "FLANGE", "HAND", "WIPER", "ArmOptions", "Calibration", "Flange", "Tip", "Tool", "WristNames", "calibrated", "fr3",
+    "from_mjcf", "from_urdf", "make_torque_driven", "panda", "urdf_spec",
 ]  # fmt: skip
 
 TOOLS = {"flange": FLANGE, "hand": HAND, "wiper": WIPER}

@@ -23,7 +23,7 @@ _TORQUE_RATES = (1e-6, 1e12)
 
 _PER_JOINT = {
     "q_min": (), "q_max": (), "qd_max": (), "tau_max": (), "friction": (3,), "home": (), "drag": (3,),
-    "sensor_friction": (3,), "sensor_drag": (3,),
+    "friction_unknown": (2,), "sensor_friction": (3,), "sensor_drag": (3,),
 }  # fmt: skip
 """What an arm has of every joint, and the shape of it."""
 
@@ -95,6 +95,11 @@ def refuse_unsound(arm: Any) -> None:
     _refuse_unsound_friction(arm, "sensor_friction", least=-1.0)  # an error of a sensor may have either sign
     _refuse_unsound_drag(arm, "drag", least=0.0)
     _refuse_unsound_drag(arm, "sensor_drag", least=-1.0)
+    for i, (viscous, dry) in enumerate(arm.friction_unknown):
+        if not (0.0 <= viscous < np.inf and 0.0 <= dry < np.inf):
+            raise InvalidInputError(
+                f"friction_unknown[{i}] = ({viscous:g} N m s/rad, {dry:g} N m); give finite numbers from 0 on"
+            )
     for i, position in enumerate(arm.home):
         if not np.isfinite(position):
             raise InvalidInputError(f"home[{i}] = {position:g} rad; give a posture well inside the limits")

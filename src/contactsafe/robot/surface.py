@@ -8,6 +8,7 @@ import numpy as np
 
 from contactsafe.robot.bodies import shown_geoms
 from contactsafe.robot.description import ArmDescription, Capsule
+from contactsafe.robot.rays import cast
 
 SURFACE_COLUMNS = 7
 """Link 1 … n, point x y z in the link's frame, m, outward normal x y z."""
@@ -93,13 +94,8 @@ def _surface(model: mujoco.MjModel, data: mujoco.MjData, geoms: np.ndarray) -> n
     rng = np.random.default_rng(0)
     starts, ends = (on_sphere(rng, (_STARTS, count)) * radius + centre for count in (1, _DIRECTIONS))
     directions = (ends - starts) / np.linalg.norm(ends - starts, axis=2, keepdims=True)
-    distances, normals = np.zeros((_STARTS, _DIRECTIONS)), np.zeros((_STARTS, 3 * _DIRECTIONS))
-    geom = np.zeros(_DIRECTIONS, dtype=np.int32)
-    for start, direction, distance, normal in zip(starts, directions, distances, normals, strict=True):
-        mujoco.mj_multiRay(
-            model, data, start[0], direction.ravel(), group, True, -1, geom, distance, normal, _DIRECTIONS, np.inf
-        )
-    normals = normals.reshape(directions.shape)
+    found = [cast(model, data, start[0], direction, group) for start, direction in zip(starts, directions, strict=True)]
+    distances, normals = np.array([one[0] for one in found]), np.array([one[1] for one in found])
     normals *= -np.sign(np.sum(normals * directions, axis=2, keepdims=True))  # whichever side a face has
     return np.concatenate([starts + distances[..., None] * directions, normals], axis=2)[distances >= 0.0]
 

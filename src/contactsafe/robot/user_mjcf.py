@@ -8,60 +8,78 @@ it; dynamics and the tool's pose do not depend on that choice.
 
 import os
 from collections.abc import Sequence
+from typing import Literal, TypedDict, Unpack
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.core.rotation import matrix_to_quat
-from contactsafe.robot.arm import Arm, finite_array, finite_range
-from contactsafe.robot.binding import actuator_of, torque_per_control
+from contactsafe.robot.arm import Arm, finite_array
 from contactsafe.robot.bodies import inertia_of, link_of, shown_by
 from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
-from contactsafe.robot.names import JOINT, SITE, find, label, listed
+from contactsafe.robot.findings import Findings
+from contactsafe.robot.missing_meshes import find_meshes
+from contactsafe.robot.names import JOINT, SITE, find
+from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec
 from contactsafe.robot.surface import geom_surface
+from contactsafe.robot.torque_driven import torque_driven_copy
+from contactsafe.robot.user_chain import choose_chain, refuse_tied, refuse_weightless
+from contactsafe.robot.user_home import at_start, check_held, checked_home, key_frame, usual_home
+from contactsafe.robot.user_limits import declared_friction, joint_range, rotor, torque_limits, torque_rate
+from contactsafe.robot.user_notes import note_home, note_unserved
 
-_BODY, _KEY, _HINGE = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_KEY, mujoco.mjtJoint.mjJNT_HINGE
+_GRAVITY_MAX = 1e3  # m/s²
+_HINGE = mujoco.mjtJoint.mjJNT_HINGE
 _LEVER_DOUBTED = 0.02
 """Of `Arm.lever_doubted`, m. Many arms are bent in one plane, where a push from the side fits points everywhere."""
 
-_USUAL_RATE, _USUAL_TORQUE = 1000.0, 87.0
-"""Of a Panda, N m/s and N m: a motor of unknown torque rate reaches its limit in the same time."""
+
+class ArmOptions(TypedDict, total=False):
+    """What may be told of the arm in a model, beside where it is; all of it may be left out.
+
+    Attributes:
+        actuators: "torque" to take the model as `contactsafe.robots.make_torque_driven` edits it.
+        tau_max: torque limits, (n,), N m; None for the model's own: forcerange and, of motors, ctrlrange, times gear,
+            and actuatorfrcrange of joints. Where both are given, the smaller holds.
+        torque_rate_max: N m/s; None for the strongest motor's limit in 87 ms, as on a Panda, and at least 1000.
+        friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3), in place of the
+            file's damping and frictionloss; None for those.
+        home: a posture well inside the limits, (n,), rad; or a key frame by its name or how it begins; None for 'home',
+            with the prefix of the joints, or the only key frame, or what `usual_home` chooses.
+        tip: the part of the tool that works, its face centred on the site; None where no part is meant to. It counts in
+            simulated worlds alone.
+    """
+
+    actuators: Literal["torque"] | None
+    tau_max: ArrayLike | None
+    torque_rate_max: float | None
+    friction: ArrayLike | None
+    home: ArrayLike | str | None
+    tip: Tip | None
 
 
 def from_mjcf(
-    scene: str | os.PathLike | mujoco.MjModel,
-    site: str,
+    scene: str | os.PathLike | mujoco.MjModel | mujoco.MjSpec,
+    site: str | Flange,
     joints: Sequence[str] | None = None,
-    *,
-    tau_max: ArrayLike | None = None,
-    torque_rate_max: float | None = None,
-    friction: ArrayLike | None = None,
-    home: ArrayLike | None = None,
-    tip: Tip | None = None,
+    **options: Unpack[ArmOptions],
 ) -> Arm:
     """Return the arm inside a user's own MJCF scene.
 
     The scene may hold anything else: tables, objects, a gripper, other robots. What is fixed to a link counts as part
-    of it, and joints that are not the arm's are locked where the key frame 'home' has them, or where the model starts.
-    Base pose, gravity and rotor inertia are the model's. Its surface is that of the colliding geoms of links 2 … n, or
-    all geoms of a link where none collides, without what the last link carries. Damping, dry friction and springs of
-    joints are left out: the controller feels them as external torque, so give `friction`, or keep them below its
-    threshold.
+    of it, and joints that are not the arm's are locked where the key frame of home has them, or where the model starts.
+    Base pose, gravity, rotor inertia, damping and frictionloss are the model's; of the last two 80 % are expected and
+    compensated, and detection allows for the rest (`contactsafe.robot.user_limits`). The arm's surface is that of the
+    colliding geoms of links 2 … n, or all geoms of a link where none collides, without what the last link carries.
 
     Args:
-        scene: path of the MJCF file, or the model compiled from it.
-        site: end-effector point; its axes are the tool's.
+        scene: path of the MJCF file, its `MjSpec`, which stays as it is, or the model compiled from it.
+        site: end-effector point, its axes are the tool's; or a `Flange` to make one, but in a compiled model.
         joints: names of the arm's hinges from base to tip; None for all that move the site, if each has an actuator.
-        tau_max: torque limits, (n,), N m; None for the model's own: forcerange and, of motors, ctrlrange, times gear,
-            and actuatorfrcrange of joints. Where both are given, the smaller holds.
-        torque_rate_max: N m/s; None for the strongest motor's limit in 87 ms, as on a Panda, and at least 1000.
-        friction: φ1 N m, φ2 s/rad, φ3 rad/s of every joint (`contactsafe.robot.friction`), (n, 3); None for none.
-        home: a posture well inside the limits, (n,), rad; None for the key frame 'home', or the middle of the range.
-        tip: the part of the tool that works, its face centred on the site; None where no part is meant to. It counts in
-            simulated worlds alone.
+        **options: see `ArmOptions`.
 
     Returns:
         An arm with the description and the tool that simulated worlds build it from. Limits that the model does not
@@ -69,42 +87,114 @@ def from_mjcf(
 
     Raises:
         InvalidInputError: the file cannot be read, a name is unknown, a joint is no hinge or does not move the
-            site, the choice of joints or actuators is ambiguous, torque limits are missing, a body of the arm
-            carries its own weight (gravcomp), an equality constraint ties the arm, or gravity or a range is no number.
+            site, the choice of joints or actuators is ambiguous, torque limits are missing or do not carry the arm at
+            home, a body of the arm carries its own weight (gravcomp), an equality constraint ties the arm, or gravity
+            or a range is no number. All that is found is told at once.
     """
-    model = _loaded(scene)
-    site_id = find(model, SITE, site)
-    chain = _chain(model, site_id, joints)
-    n = len(chain)
-    _refuse_weightless(model, chain)
-    _refuse_tied(model, chain)
-    q_min, q_max = _joint_range(model, chain)
-    limits = _torque_limits(model, chain, tau_max)
-    data, key_home = _at_start(model, chain)
-    friction = np.zeros((n, 3)) if friction is None else finite_array(friction, (n, 3), "friction")
-    home = _home(key_home if home is None else home, q_min, q_max)
-    nominal, found = _nominal_model(model, data, chain, site_id, limits), Found(model, data, chain, site_id)
-    name, rate = model.names.split(b"\0")[0].decode(), _torque_rate(torque_rate_max, limits)
+    refuse_options(options)
+    torque, findings = options.get("actuators") is not None, Findings()
+    if isinstance(scene, mujoco.MjModel):
+        model, name = scene, _site_of(site)
+    else:
+        spec, what = _spec(scene)
+        if torque:
+            spec, name = torque_driven_copy(spec, site, joints, options.get("tau_max"), findings)
+        else:
+            find_meshes(spec, findings)
+            name = add_flange(spec, site)
+        model = compiled_spec(spec, what)
+    return arm_in(model, name, joints, options, findings)
+
+
+def arm_in(
+    model: mujoco.MjModel, site: str, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
+) -> Arm:
+    """Return the arm in a compiled scene, and tell what was found; see `from_mjcf`."""
+    site_id, torque = find(model, SITE, site), options.get("actuators") is not None
+    chain = choose_chain(model, site_id, joints, findings, many=torque)
+    if not torque:
+        refuse_weightless(model, chain, findings)
+    refuse_tied(model, chain, findings, may_be_led=torque)
+    arm = _arm(Found(model, mujoco.MjData(model), chain, site_id), options, findings)
+    findings.warn(arm.name)
+    return arm
+
+
+def refuse_options(options: ArmOptions) -> None:
+    """Refuse what is no option of an arm.
+
+    Raises:
+        TypeError: a keyword is unknown.
+        InvalidInputError: `actuators` is none of what it may be.
+    """
+    unknown = sorted(set(options) - set(ArmOptions.__annotations__))
+    if unknown:
+        raise TypeError(
+            f"unexpected keyword argument {unknown[0]!r}; there are {', '.join(ArmOptions.__annotations__)}"
+        )
+    if options.get("actuators") not in (None, "torque"):
+        raise InvalidInputError(
+            f"actuators = {shown(options['actuators'])}; give 'torque' to replace servos by motors, or None"
+        )
+
+
+def _arm(found: Found, options: ArmOptions, findings: Findings) -> Arm:
+    """Build the arm whose joints are known, or tell all that is wrong with it."""
+    model, chain, n = found.model, found.chain, len(found.chain)
+    q_min, q_max = joint_range(model, chain)
+    limits = torque_limits(model, chain, options.get("tau_max"), findings)
+    asked, key = options.get("home"), -1
+    with findings.noting():
+        wanted = asked if isinstance(asked, str) else None
+        key = key_frame(model, chain, wanted, Findings() if asked is not None else findings)
+    data, key_home = at_start(model, chain, key)
+    given = key_home if asked is None or isinstance(asked, str) else asked
+    home = checked_home(given, q_min, q_max, findings)
+    rate = 1.0
+    with findings.noting():
+        rate = torque_rate(options.get("torque_rate_max"), limits)
+    found = found._replace(data=data)
+    nominal = _nominal_model(model, data, chain, found.site, limits)
+    if given is None:
+        home = usual_home(model, chain, nominal, limits)
+    friction, drag, unknown = _friction(found, limits, nominal, options.get("friction"), findings)
+    if np.linalg.norm(nominal.opt.gravity) < _GRAVITY_MAX:  # or the arm is refused for that
+        meant = key >= 0 or asked is not None
+        check_held(model, chain, (_gravity(nominal, home), limits), meant, findings)
+    findings.raise_problems()
+    name = model.names.split(b"\0")[0].decode()
     description = describe(found, name, _joints(nominal, q_min, q_max, limits, friction), rate, home)
-    surface = geom_surface(model, data, shown_by(model, chain), data.xanchor[chain])
+    surface, tool = (
+        geom_surface(model, data, shown_by(model, chain), data.xanchor[chain]),
+        carried_tool(found, options.get("tip")),
+    )
+    note_home(model, data, chain, home, findings)
+    note_unserved(model, chain, nominal, home, findings)
     return Arm(
-        name, nominal, site, q_min, q_max, np.full(n, np.inf), limits, rate, friction, home, description,
-        carried_tool(found, tip), surface, _LEVER_DOUBTED,
+        name, nominal, str(mujoco.mj_id2name(model, SITE, found.site)), q_min, q_max, np.full(n, np.inf), limits, rate,
+        friction, home, description, tool, surface, _LEVER_DOUBTED, drag=drag, friction_unknown=unknown,
     )  # fmt: skip
 
 
-def _joint_range(model: mujoco.MjModel, chain: list[int]) -> np.ndarray:
-    limited = model.jnt_limited[chain].astype(bool)
-    return np.where(limited, model.jnt_range[chain].T, [[-np.inf], [np.inf]])
-
-
-def _torque_rate(given: float | None, tau_max: np.ndarray) -> float:
-    """Return how fast motors change their torque, N m/s: as given, or in proportion to the strongest one."""
+def _friction(
+    found: Found, limits: np.ndarray, nominal: mujoco.MjModel, given: ArrayLike | None, findings: Findings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return friction, drag and unknown friction as of `Arm`: those given, or the file's."""
+    n = len(found.chain)
+    friction = np.zeros((n, 3))
     if given is None:
-        return _USUAL_RATE * max(1.0, float(tau_max.max()) / _USUAL_TORQUE)
-    if not finite_array(given, (), "torque_rate_max") > 0.0:
-        raise InvalidInputError(f"torque_rate_max = {given} must be greater than 0; give N m/s")
-    return float(given)
+        return friction, *declared_friction(found.model, found.chain, limits, nominal, findings)
+    with findings.noting():
+        friction = finite_array(given, (n, 3), "friction")
+    return friction, np.zeros((n, 3)), np.zeros((n, 2))
+
+
+def _gravity(nominal: mujoco.MjModel, q: np.ndarray) -> np.ndarray:
+    """Return the torque that holds an arm at q (n,), (n,), N m."""
+    data = mujoco.MjData(nominal)
+    data.qpos[:] = q
+    mujoco.mj_forward(nominal, data)
+    return data.qfrc_bias.copy()
 
 
 def _joints(
@@ -118,137 +208,31 @@ def _joints(
     )
 
 
-def _refuse_tied(model: mujoco.MjModel, chain: list[int]) -> None:
-    """Refuse equality constraints on the arm: a dynamic model of the chain alone would not know them."""
-    carried = {int(model.jnt_bodyid[joint]) for joint in chain}
-    for i in np.flatnonzero(model.eq_active0).tolist():
-        if not carried.isdisjoint(_tied_bodies(model, i)):
-            name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, i)
-            raise InvalidInputError(
-                f"equality constraint {name} ties the arm; an arm is a free chain of hinges, remove it"
-            )
+def _site_of(site: str | Flange) -> str:
+    if isinstance(site, Flange):
+        raise InvalidInputError(
+            "a compiled MjModel takes no more sites; give the path or the MjSpec with the Flange, or a site's name"
+        )
+    return site
 
 
-def _tied_bodies(model: mujoco.MjModel, i: int) -> list[int]:
-    """Return the moving bodies that an equality constraint ties: by their joints, by themselves or by their sites."""
-    ends = [int(end) for end in (model.eq_obj1id[i], model.eq_obj2id[i]) if end >= 0]
-    if model.eq_type[i] == int(mujoco.mjtEq.mjEQ_JOINT):
-        return [int(model.jnt_bodyid[end]) for end in ends]
-    if model.eq_objtype[i] == int(SITE):
-        ends = [int(model.site_bodyid[end]) for end in ends]
-    elif model.eq_objtype[i] != int(_BODY):
-        return []
-    return [int(model.body_weldid[end]) for end in ends]
-
-
-def _loaded(scene) -> mujoco.MjModel:
-    if isinstance(scene, mujoco.MjModel):
-        return scene
+def _spec(scene: object) -> tuple[mujoco.MjSpec, str]:
+    """Read a scene to be edited, and say what it is called in messages."""
+    if isinstance(scene, mujoco.MjSpec):
+        return scene.copy(), "the MjSpec"
     if not isinstance(scene, (str, os.PathLike)) or not os.path.isfile(scene):
         raise InvalidInputError(
-            f"no file at '{str(scene)[:80]}'; give the path of an MJCF file, or a compiled mujoco.MjModel"
+            f"no file at '{str(scene)[:80]}'; give the path of an MJCF file, a mujoco.MjSpec, or a compiled "
+            "mujoco.MjModel"
         )
+    path = os.fspath(scene)
+    if path.lower().endswith(".urdf"):
+        raise InvalidInputError(f"'{path}' is a URDF; give it to robots.from_urdf")
     try:
-        return mujoco.MjModel.from_xml_path(os.fspath(scene))
+        return mujoco.MjSpec.from_file(path), f"'{path}'"
     except ValueError as error:
         reason = " ".join(str(error).split())
-        raise InvalidInputError(f"MuJoCo cannot read '{scene}': {reason}; mend the file") from None
-
-
-def _chain(model: mujoco.MjModel, site_id: int, names: Sequence[str] | None) -> list[int]:
-    """Choose the arm's joints among those that move the site, from base to tip."""
-    moving = _joints_above(model, model.site_bodyid[site_id])
-    site, rest = label(model, SITE, site_id), listed(label(model, JOINT, joint) for joint in moving)
-    chosen = moving if names is None else [find(model, JOINT, name) for name in names]
-    if not moving or not chosen:
-        raise InvalidInputError(f"no joints for site {site}; give it to a body of the arm; joints that move it: {rest}")
-    for joint in chosen:
-        kind = mujoco.mjtJoint(model.jnt_type[joint])
-        if joint not in moving:
-            problem = f"does not move site {site}; joints that do, base to tip: {rest}"
-        elif kind != _HINGE:
-            word = kind.name.removeprefix("mjJNT_").lower()
-            problem = f"is of type {word}; the arm's are hinges: give joints=[...] without it, to lock it"
-        elif names is None and actuator_of(model, joint) is None:
-            problem = "has no actuator; give joints=[...] with it, or without it, to lock it"
-        else:
-            continue
-        raise InvalidInputError(f"joint {label(model, JOINT, joint)} {problem}")
-    if chosen != [joint for joint in moving if joint in chosen]:
-        raise InvalidInputError(
-            f"joints = {list(names or ())} are not in order; from base to tip they stand so: {rest}"
-        )
-    return chosen
-
-
-def _joints_above(model: mujoco.MjModel, body: int) -> list[int]:
-    """Find all joints between the world and a body, from the world on."""
-    joints: list[int] = []
-    while body != 0:
-        first = model.body_jntadr[body]
-        joints[:0] = range(first, first + model.body_jntnum[body])
-        body = model.body_parentid[body]
-    return joints
-
-
-def _refuse_weightless(model: mujoco.MjModel, chain: list[int]) -> None:
-    floating = np.flatnonzero((link_of(model, chain) > 0) & (model.body_gravcomp != 0.0))
-    if floating.size:
-        raise InvalidInputError(
-            f"body {label(model, _BODY, floating[0])} has gravcomp = {model.body_gravcomp[floating[0]]:g}; "
-            "the controller's torque includes gravity, so it must be 0 on every body of the arm"
-        )
-
-
-def _torque_limits(model: mujoco.MjModel, chain: list[int], given) -> np.ndarray:
-    limits = np.array([_torque_limit(model, joint) for joint in chain])
-    if given is not None:
-        limits = np.minimum(limits, finite_array(given, limits.shape, "tau_max"))
-    for joint, limit in zip(chain, limits, strict=True):
-        if not 0.0 < limit < np.inf:
-            found = "no torque limit" if limit > 0.0 else f"a torque limit of {limit:g} N m, which is not above 0"
-            raise InvalidInputError(
-                f"joint {label(model, JOINT, joint)} has {found}; give tau_max=[...], {len(chain)} numbers in N m, "
-                "and its motor a forcerange on both sides of 0"
-            )
-    return limits
-
-
-def _torque_limit(model: mujoco.MjModel, joint: int) -> float:
-    """Return what the model lets the joint's actuator do in both directions, N m; inf where it does not say."""
-    ranges = []
-    if model.jnt_actfrclimited[joint]:
-        ranges.append(model.jnt_actfrcrange[joint])
-    actuator = actuator_of(model, joint)
-    if actuator is not None and model.actuator_forcelimited[actuator]:
-        ranges.append(model.actuator_gear[actuator, 0] * model.actuator_forcerange[actuator])
-    if actuator is not None and model.actuator_ctrllimited[actuator] and torque_per_control(model, actuator) != 0.0:
-        ranges.append(torque_per_control(model, actuator) * model.actuator_ctrlrange[actuator])
-    return min((max(0.0, min(-min(ends), max(ends))) for ends in ranges), default=np.inf)
-
-
-def _at_start(model: mujoco.MjModel, chain: list[int]) -> tuple[mujoco.MjData, np.ndarray | None]:
-    """Place all bodies with the arm's joints unturned and the others locked; give the arm's key frame 'home' too."""
-    data = mujoco.MjData(model)
-    address = model.jnt_qposadr[chain]
-    key = mujoco.mj_name2id(model, _KEY, "home")
-    if key >= 0:
-        mujoco.mj_resetDataKeyframe(model, data, key)
-    home = data.qpos[address].copy() if key >= 0 else None
-    data.qpos[address] = model.qpos0[address]
-    mujoco.mj_kinematics(model, data)
-    return data, home
-
-
-def _home(home, q_min: np.ndarray, q_max: np.ndarray) -> np.ndarray:
-    if home is None:
-        return np.mean(finite_range(q_min, q_max), axis=0)
-    home = finite_array(home, q_min.shape, "home")
-    outside = (home < q_min) | (home > q_max)
-    if outside.any():
-        i = int(np.argmax(outside))
-        raise InvalidInputError(f"home[{i}] = {home[i]:g} rad is outside [{q_min[i]:g}, {q_max[i]:g}]; move it inside")
-    return home
+        raise InvalidInputError(f"MuJoCo cannot read '{path}': {reason}; mend the file") from None
 
 
 def _nominal_model(
@@ -275,23 +259,13 @@ def _nominal_model(
             ref=model.qpos0[model.jnt_qposadr[joint]],
             limited=bool(model.jnt_limited[joint]),
             range=model.jnt_range[joint],
-            armature=_rotor(model, joint),
+            armature=rotor(model, joint),
         )
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        motor.set_to_motor()
-        motor.ctrllimited, motor.ctrlrange = True, (-limit, limit)
+        become_motor(motor, limit)
     quat = matrix_to_quat(data.site_xmat[site_id].reshape(3, 3))
     body.add_site(name=mujoco.mj_id2name(model, SITE, site_id), pos=data.site_xpos[site_id] - origin, quat=quat)
     return spec.compile()
-
-
-def _rotor(model: mujoco.MjModel, joint: int) -> float:
-    """Return the rotor inertia felt at a joint, kg m²: its own armature, and the actuator's through the gear."""
-    armature = float(model.dof_armature[model.jnt_dofadr[joint]])
-    actuator = actuator_of(model, joint)
-    if actuator is not None:
-        armature += float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
-    return armature
 
 
 def _set_inertia(body, total: Inertia | None) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.errors import InvalidInputError, UnsupportedVersionError
 from contactsafe.robot.arm import Arm, description_and_tool
 from contactsafe.robot.description import ArmDescription, Inertia, Tool
 from contactsafe.robot.mjcf import FLANGE_SITE, TIP_GEOM, arm_body, model_root, numbers
@@ -21,7 +21,13 @@ def build_plant(arm: Arm, config: WorldConfig) -> mujoco.MjModel:
 
     Raises:
         InvalidInputError: the arm has no description to build a plant from.
+        UnsupportedVersionError: this MuJoCo has no contact sensors.
     """
+    if not hasattr(mujoco.mjtSensor, "mjSENS_CONTACT"):
+        raise UnsupportedVersionError(
+            f"mujoco {mujoco.__version__} has no contact sensors, which simulated worlds and tasks need; a controller "
+            "in a scene of your own runs on it; run: pip install 'mujoco>=3.3.5'"
+        )
     return mujoco.MjModel.from_xml_string(scene_mjcf(arm, config))
 
 

@@ -88,6 +88,7 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     errors["tool_mass"], errors["tool_com"] = arm.tool.inertia.mass, arm.tool.inertia.com
     errors["tcp"] = arm.tool.tcp
     fill_friction(errors, arm.friction, arm.drag, per_joint(config.plant.friction_scale, arm.n, "friction_scale"))
+    errors["drag"][:, 0] = np.minimum(errors["drag"][:, 0], _stable_damping(arm, tick_s))
     errors["stiction"] = per_joint(config.plant.stiction_nm, arm.n, "stiction_nm")
     joints = errors["joints"]
     joints["band_sigma"] = sensors.velocity_band_rad_s * band_gain(tick_s)
@@ -96,6 +97,13 @@ def fill_errors(errors: Record, arm: Arm, config: WorldConfig, tick_s: float) ->
     joints["friction"], joints["drag"] = arm.sensor_friction, arm.sensor_drag
     fill_base_sensor(errors["base"], sensors, noise_channels(arm.n, sensors) - CHANNELS)
     errors["delay_ticks"] = config.plant.torque_delay_ticks
+
+
+def _stable_damping(arm: Arm, tick_s: float) -> np.ndarray:
+    """Return how much viscous friction the plant's joints take, which is applied a tick late, (n,), N m s/rad."""
+    if not arm.drag[:, 0].any():
+        return np.full(arm.n, np.inf)
+    return 0.25 / (tick_s * np.diag(arm.dynamics(arm.home, np.zeros(arm.n))["M_inv"]))
 
 
 def fill_friction(errors: Record, friction: np.ndarray, drag: np.ndarray, scale: np.ndarray | float) -> None:

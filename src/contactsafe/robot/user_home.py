@@ -1,0 +1,189 @@
+"""Where a user's arm starts: its key frame, and whether it can stay there."""
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.arm import finite_array, finite_range
+from contactsafe.robot.binding import actuators_of
+from contactsafe.robot.bodies import base_bodies, link_of
+from contactsafe.robot.findings import Findings
+from contactsafe.robot.names import BODY, JOINT, label, listed
+
+_KEY = mujoco.mjtObj.mjOBJ_KEY
+
+_TRIED, _INNER, _SHARES = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
+"""Postures that are tried, the part of a range at either end that they keep away from, and how far towards them."""
+
+_READY = 0.4
+"""Part of the best readiness from which on a posture will do."""
+
+HOME = "home"
+"""The key frame that is taken where none is named."""
+
+
+def key_frame(model: mujoco.MjModel, chain: list[int], asked: str | None, findings: Findings) -> int:
+    """Find the key frame of an arm's home; −1 for none.
+
+    Args:
+        model: of the scene.
+        chain: the arm's joints.
+        asked: its name, or the first letters of only one; None for 'home', the only one, or the 'home' with the
+            prefix that a joint has, as `attach` gives it.
+        findings: told where none is taken though there are some.
+
+    Raises:
+        InvalidInputError: there is none of that name.
+    """
+    names = [mujoco.mj_id2name(model, _KEY, i) or "" for i in range(model.nkey)]
+    if asked is not None:
+        found = [name for name in names if name == asked] or [one for one in names if asked and one.startswith(asked)]
+        if len(found) != 1:
+            raise InvalidInputError(f"home = {asked!r} is none of the key frames {listed(map(repr, names))}; give one")
+        return names.index(found[0])
+    if HOME in names:
+        return names.index(HOME)
+    if len(names) == 1:
+        return 0
+    joint = mujoco.mj_id2name(model, JOINT, chain[0]) or ""
+    prefixed = [name for name in names if name.endswith(HOME) and joint.startswith(name.removesuffix(HOME))]
+    if len(prefixed) == 1:
+        return names.index(prefixed[0])
+    if names:
+        findings.note(
+            f"home is one that was chosen here, since no key frame is called '{HOME}'; of {listed(map(repr, names))} "
+            "give home='...'"
+        )
+    return -1
+
+
+def at_start(model: mujoco.MjModel, chain: list[int], key: int) -> tuple[mujoco.MjData, np.ndarray | None]:
+    """Place all bodies with the arm's joints unturned and the others locked, as a key frame has them.
+
+    Returns:
+        Data so placed, and the arm's joints in the key frame, (n,), rad; None without one.
+    """
+    data = mujoco.MjData(model)
+    address = model.jnt_qposadr[chain]
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    home = data.qpos[address].copy() if key >= 0 else None
+    data.qpos[address] = model.qpos0[address]
+    mujoco.mj_kinematics(model, data)
+    return data, home
+
+
+def checked_home(home: ArrayLike | None, q_min: np.ndarray, q_max: np.ndarray, findings: Findings) -> np.ndarray:
+    """Return a home within the range, (n,), rad: the one given, or the middle of the range, see `usual_home`."""
+    middle = np.mean(finite_range(q_min, q_max), axis=0)
+    if home is None:
+        return middle
+    try:
+        given = finite_array(home, q_min.shape, "home")
+    except InvalidInputError as error:
+        findings.problem(str(error))
+        return middle
+    outside = (given < q_min) | (given > q_max)
+    if outside.any():
+        i = int(np.argmax(outside))
+        findings.problem(f"home[{i}] = {given[i]:g} rad is outside [{q_min[i]:g}, {q_max[i]:g}]; move it inside")
+    return given
+
+
+def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel, limits: np.ndarray) -> np.ndarray:
+    """Choose a home where nobody gave one, (n,), rad: a posture from which the arm can work.
+
+    It is the middle of the range where the tool can be moved to all sides there and the motors carry the arm; else the
+    posture next to it, of many at random and those between, the same in every run.
+
+    Args:
+        model: of the scene.
+        chain: the arm's joints.
+        nominal: model of the arm alone.
+        limits: of torque, (n,), N m.
+    """
+    limited = model.jnt_limited[chain].astype(bool)
+    low, high = (np.where(limited, model.jnt_range[chain, end], (-np.pi, np.pi)[end]) for end in (0, 1))
+    middle, n = 0.5 * (low + high), len(chain)
+    rng = np.random.default_rng(0)
+    postures = np.vstack([middle, rng.uniform(low + _INNER * (high - low), high - _INNER * (high - low), (_TRIED, n))])
+    data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
+    for i, q in enumerate(postures):
+        readiness[i] = _readiness(nominal, data, q, limits)
+    ready = _READY * readiness.max()
+    between = [middle + share * (q - middle) for q in postures[readiness >= ready] for share in _SHARES]
+    distance = [float(np.linalg.norm((q - middle) / (high - low))) for q in between]
+    scene = mujoco.MjData(model)
+    for i in np.argsort(distance, kind="stable"):
+        scene.qpos[model.jnt_qposadr[chain]] = between[i]
+        if _readiness(nominal, data, between[i], limits) >= ready and not touching(model, scene, chain):
+            return between[i]
+    return middle
+
+
+def _readiness(nominal: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, limits: np.ndarray) -> float:
+    """Return how far the tool moves at least for a radian of all joints, m; 0 where gravity takes half the torque."""
+    data.qpos[:], data.qvel[:] = q, 0.0
+    mujoco.mj_forward(nominal, data)
+    if (np.abs(data.qfrc_bias) > 0.5 * limits).any():
+        return 0.0
+    return least_reach(nominal, data)
+
+
+def least_reach(nominal: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Return how far the tool moves at least for a radian of all joints, m; a turn moves what is half a metre away."""
+    J = np.zeros((6, nominal.nv))
+    mujoco.mj_jacSite(nominal, data, J[:3], J[3:], 0)
+    J[3:] *= 0.5
+    return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+
+def touching(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> list[str]:
+    """Return the pairs of bodies that touch, of which one is moved by the arm and the other is not alike."""
+    mujoco.mj_fwdPosition(model, data)
+    links, base = link_of(model, chain), base_bodies(model, chain)
+    pairs = []
+    for i in range(data.ncon):
+        contact = data.contact[i]
+        if min(contact.geom1, contact.geom2) < 0:  # a flexible body's
+            continue
+        first, second = sorted(int(model.geom_bodyid[geom]) for geom in (contact.geom1, contact.geom2))
+        apart = links[first] != links[second] or base[first] or base[second]
+        if contact.dist < 0.0 and apart and max(links[first], links[second]) > 0:
+            pairs.append(f"{label(model, BODY, first)} on {label(model, BODY, second)}")
+    return list(dict.fromkeys(pairs))
+
+
+def check_held(
+    model: mujoco.MjModel, chain: list[int], torques: tuple[np.ndarray, np.ndarray], meant: bool, findings: Findings
+) -> None:
+    """Tell of joints whose motors cannot carry the arm at home.
+
+    Args:
+        model: of the scene.
+        chain: the arm's joints.
+        torques: what holds the arm at home, and the limits, (n,), N m each.
+        meant: whether somebody chose that home; the middle of the range is nobody's choice.
+        findings: told of them: a problem, but of a home that nobody chose a note, unless limits are angles.
+    """
+    weak = [row for row in zip(chain, *torques, strict=True) if abs(row[1]) > row[2]]
+    if not weak:
+        return
+    short = ", ".join(
+        f"{abs(need):.3g} N m at joint {label(model, JOINT, joint)} (limit {limit:.3g})" for joint, need, limit in weak
+    )
+    angles = [joint for joint, _, _ in weak if _is_angle(model, joint)]
+    remedy = "give the motors a forcerange in N m, or another home=[...]"
+    if angles:
+        remedy = (
+            f"the ctrlrange of {listed(label(model, JOINT, joint) for joint in angles)} is that of angles, {remedy}"
+        )
+    text = f"gravity takes {short} at home, and the arm would fall; {remedy}"
+    findings.problem(text) if meant or angles else findings.note(text)
+
+
+def _is_angle(model: mujoco.MjModel, joint: int) -> bool:
+    """Tell whether a motor on a joint has the joint's range for its range of control."""
+    works = [one for one in actuators_of(model, joint) if model.actuator_ctrllimited[one]]
+    return any(np.allclose(model.actuator_ctrlrange[one], model.jnt_range[joint], atol=0.05) for one in works)

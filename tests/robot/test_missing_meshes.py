@@ -1,0 +1,39 @@
+"""Meshes that a downloaded MJCF names and that are not where it says."""
+
+import mujoco
+import pytest
+from tests.robot.test_models_as_they_come import FLANGE, SERVO
+from tests.robot.test_urdf_meshes import _TETRAHEDRON
+
+from contactsafe import robots
+from contactsafe.core.errors import InvalidInputError, ModelWarning
+
+SEEN = '<geom type="mesh" mesh="part" mass="0"/>'
+ASSET = '<asset><mesh name="part" file="part.obj"/></asset><worldbody>'
+
+
+def write(folder, geom):
+    text = SERVO.replace("<worldbody>", ASSET).replace('<body name="fore"', f'{geom}<body name="fore"')
+    (folder / "arm.xml").write_text(text, encoding="utf-8")
+    return folder / "arm.xml"
+
+
+@pytest.mark.filterwarnings("ignore:arm:UserWarning")
+def test_mesh_in_another_folder_is_found(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "part.obj").write_text(_TETRAHEDRON, encoding="utf-8")
+    spec = mujoco.MjSpec.from_file(str(write(tmp_path, SEEN)))
+    robots.make_torque_driven(spec, FLANGE)
+    assert spec.compile().nmesh == 1
+
+
+def test_mesh_that_is_only_seen_is_left_out_with_a_note(tmp_path):
+    path = write(tmp_path, SEEN)
+    with pytest.warns(ModelWarning, match=r"1 meshes are left out, for their files are not there: part; "):
+        robots.from_mjcf(path, FLANGE, actuators="torque")
+
+
+def test_mesh_that_a_body_has_its_mass_from_is_asked_for(tmp_path):
+    path = write(tmp_path, '<geom type="mesh" mesh="part"/>')
+    with pytest.raises(InvalidInputError, match=r"^body 'upper' has its mass from a mesh that is not there; get the"):
+        robots.from_mjcf(path, FLANGE, actuators="torque")
