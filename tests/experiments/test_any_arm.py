@@ -8,7 +8,8 @@ import pytest
 
 from contactsafe.control import presets
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.experiments.any_arm import any_arm, compared
+from contactsafe.experiments.any_arm import any_arm
+from contactsafe.experiments.any_arm_tables import compared
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.report import write_report
 from contactsafe.results.experiment import Trial

@@ -28,7 +28,8 @@ from contactsafe.control.payload import (
 )
 from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.supervision import supervise
-from contactsafe.control.tool_wrench import follow_tool_force, separate_tool_wrench, take_all_for_the_arm
+from contactsafe.control.tool_force import follow_tool_force
+from contactsafe.control.tool_wrench import separate_tool_wrench, take_all_for_the_arm
 from contactsafe.control.touch import follow_change, follow_touch
 from contactsafe.control.velocity import follow_velocities
 from contactsafe.core.arrays import Matrix, Record

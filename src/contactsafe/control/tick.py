@@ -38,7 +38,7 @@ from contactsafe.control.limits import fill_tank, limit_command, limit_torque
 from contactsafe.control.plausibility import BRIDGE_TICKS, is_usable
 from contactsafe.control.stopping import stop_late_target, stop_torque
 from contactsafe.control.target import accept_target
-from contactsafe.control.tool_wrench import follow_tool_force
+from contactsafe.control.tool_force import follow_tool_force, follow_tool_limit
 from contactsafe.control.touch import follow_touch
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
@@ -130,9 +130,9 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
         overcome_stiction(elastic, arm.qd, params.arm)
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
     follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain)
-    scale, reason = contact_bound.tool_task_scale(
-        F_spring, tool.force, params.classification.tool_contact_n, params.reaction.tool_force_limit_n
-    )
+    contact_n = params.classification.tool_contact_n
+    limit = follow_tool_limit(tool, arm, state.contact_work, contact_n, params.reaction)
+    scale, reason = contact_bound.tool_task_scale(F_spring, tool.force, contact_n, limit)
     if state.mode == FREE:
         c.output.contact_command_nm, c.output.contact_limit_nm = 0.0, math.inf
         contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)

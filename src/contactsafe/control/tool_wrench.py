@@ -1,4 +1,4 @@
-"""Identification: what of a residual is the tool's wrench and what the arm's contact, and the force at the tool."""
+"""Identification: what of a residual is the tool's wrench, and what the arm's contact."""
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from contactsafe.core.linalg import matvec_t_into
 from contactsafe.core.stack import stack_vector
 
 _f = np.float64
+_i = np.int64
 
 
 def tool_wrench_dtype(n: int) -> np.dtype:
@@ -22,6 +23,7 @@ def tool_wrench_dtype(n: int) -> np.dtype:
             ("arm_torque", _f, (n,)),  # compensating residual less the tool's part, N m
             ("arm_torque_fast", _f, (n,)),  # the fast one less the tool's part, N m
             ("in_contact", tool_in_contact_dtype(n)),
+            ("pushed", _i),  # 1 where somebody pushes what may be the tool
         ]
     )
 
@@ -87,20 +89,3 @@ def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Rec
     detection_residual[:] = observer.residual_fast
     tool.arm_torque[:] = observer.residual
     tool.arm_torque_fast[:] = observer.residual_fast
-
-
-@inlined
-def follow_tool_force(tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
-    """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
-
-    While something touches the arm, that is the force of before and what has met the tool since.
-    """
-    wrench = stack_vector(6)
-    if arm.has_wrench != 0:
-        wrench[:] = arm.wrench_ee
-    elif mode != FREE:
-        wrench[:] = tool.wrench
-        wrench[:3] += tool.in_contact.force
-    else:
-        matvec_t_into(J_bar, residual_fast, wrench)
-    observer_step(tool.force, gain, wrench[:3])

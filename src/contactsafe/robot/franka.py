@@ -63,9 +63,7 @@ def franka_arm(
         source=source,
         base=base,
         base_capsules=_BASE_CAPSULES,
-        links=tuple(
-            Link(position, quat, inertia, joint, capsules) for (position, quat), inertia, joint, capsules in parts
-        ),
+        links=tuple(Link(*frame, inertia, joint, capsules) for frame, inertia, joint, capsules in parts),
         mount_position=(0.0, 0.0, 0.107),
         mount_quat=(math.cos(math.pi / 8), 0.0, 0.0, -math.sin(math.pi / 8)),
         torque_rate_max=1000.0,

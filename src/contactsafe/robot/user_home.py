@@ -171,7 +171,7 @@ def check_held(
     if not weak:
         return
     short = ", ".join(
-        f"{abs(need):.3g} N m at joint {label(model, JOINT, joint)} (limit {limit:.3g})" for joint, need, limit in weak
+        f"{abs(need):.3g} N m at joint {label(model, JOINT, i)} (limit {top:.3g})" for i, need, top in weak
     )
     angles = [joint for joint, _, _ in weak if _is_angle(model, joint)]
     remedy = "give the motors a forcerange in N m, or another home=[...]"

@@ -21,8 +21,7 @@ def note_home(
     """Tell of a home beside the end of a joint's range, or where the arm touches something.
 
     Args:
-        model: of the scene.
-        data: of it; the arm is moved home.
+        model, data: of the scene; the arm is moved home.
         chain: the arm's joints.
         home: (n,), rad.
         findings: told of both.
