@@ -260,3 +260,4 @@ def test_a_contact_that_the_joints_do_not_feel_is_not_taken_for_the_offset():
     contact = scene.run(600)
     assert not contact.touched
     assert scene.found["wrench"][2] > 10.0
+    assert scene.found["sigma"][2] < 1.0

@@ -65,12 +65,14 @@ def _learn(base: Record, regressor: Matrix, dt: float) -> None:
     if base.seconds <= 0.0:
         return
     gain = min(max(filter_gain(_MEMORY_1_S, dt), dt / base.seconds), 1.0)
-    if base.told != 0 and _shows(base):
+    doubted = base.told != 0 and _shows(base)
+    if doubted:
         gain = filter_gain(_DOUBTED_1_S, dt)
     for k in range(6):
         news = base.residual[k] - base.offset[k]
         base.offset[k] += gain * news
-        base.variance[k] += gain * ((1.0 - gain) * news * news - base.variance[k])
+        if not doubted:
+            base.variance[k] += gain * ((1.0 - gain) * news * news - base.variance[k])
     for k in range(3):
         for link in range(regressor.shape[1]):
             base.regressor[k, link] += gain * (regressor[k, link] - base.regressor[k, link])
