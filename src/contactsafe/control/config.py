@@ -143,7 +143,11 @@ class ReactionConfig(Stage):
     )  # fmt: skip
     contact_force_limit_decay_s: float = parameter(0.15, "s", "time constant with which it falls", positive=True)
     tool_force_limit_n: float = parameter(
-        _INF, "N", "largest commanded force of the tool against what it touches", infinite=True
+        _INF,
+        "N",
+        "largest commanded force of the tool against what it touches; without a force sensor "
+        "`reject_force_n` against what has done work on the arm, where that is more",
+        infinite=True,
     )
     reject_margin: float = parameter(
         2.0, "", "multiple of a push's torque up to which mode REJECT resists it at least, within its limit in N m"
@@ -180,7 +184,10 @@ class ImpedanceConfig(Stage):
         (12.0, 12.0, 12.0, 12.0, 10.0, 8.0, 6.0), "N m s/rad", "D2, posture damping, one a joint", per_joint=True
     )
     friction_compensation: bool = parameter(
-        True, "", "add the arm's nominal friction torque to the command, and expect it in the observer"
+        True,
+        "",
+        "add the arm's nominal friction torque to the command, and expect it in the observer; at rest "
+        "add, in the direction of the elastic torque, most of the dry friction that the arm's file declares",
     )
     stiffness_range: tuple[float, float] = parameter((10.0, 1500.0), "1/s²", "allowed K_task")
     damping_range: tuple[float, float] = parameter((2.0, 120.0), "1/s", "allowed D_task")

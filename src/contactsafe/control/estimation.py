@@ -109,9 +109,9 @@ def estimate(c: Record, J_bar: Matrix) -> None:
     if state.arm.has_wrench != 0 or params.observer.cancel_tool_wrench == 0 or state.arm.q.shape[0] <= 6:
         take_all_for_the_arm(tool, detection.residual, observer)
     else:
-        pushed = is_active(state.contact_work) and _is_beside_tool(state, J_bar, params.identification)
+        beside_tool = is_active(state.contact_work) and _is_beside_tool(state, J_bar, params.identification)
         separate_tool_wrench(
-            tool, detection.residual, observer, dynamics.J, J_bar, state.mode, pushed, state.step,
+            tool, detection.residual, observer, dynamics.J, J_bar, state.mode, beside_tool, state.step,
             params.identification,
         )  # fmt: skip
     follow_change(c)

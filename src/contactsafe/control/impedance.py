@@ -19,12 +19,9 @@ from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into, shorten
 from contactsafe.core.stack import stack_vector
-from contactsafe.robot.friction import DRY_STEEP
+from contactsafe.robot.friction import DRY_STEEP, FRICTION_FRACTION
 
 _f = np.float64
-
-_STICTION_PART = 0.8
-"""Of the dry friction that a file declares, that is overcome: friction is not known better."""
 
 
 def impedance_dtype(n: int) -> np.dtype:
@@ -149,18 +146,18 @@ def overcome_stiction(elastic: Vector, qd: Vector, arm: Record) -> None:
     """Add to an elastic torque in place what dry friction is known to keep from the links: in the torque's direction.
 
     At rest the velocity does not say which way friction acts, but it is against what would move the joint. Added is as
-    much again as is asked for, up to a part of the friction: never more than holds the joint by itself.
+    much again as is asked for, up to a part of the friction: never more than holds the joint by itself. In motion it
+    fades: then friction is compensated by velocity.
 
     Args:
         elastic: of task and posture, (n,), N m; updated.
         qd: (n,), rad/s.
-        arm: `arm_dtype` record: its dry friction, and what of it is compensated by velocity.
+        arm: `arm_dtype` record.
     """
     for i in range(elastic.shape[0]):
         dry = arm.friction_unknown[i, 1]
         if dry != 0.0:
-            by_velocity = arm.drag[i, 2] * math.tanh(0.5 * DRY_STEEP * abs(qd[i]))
-            most = max(_STICTION_PART * dry - by_velocity, 0.0)
+            most = FRICTION_FRACTION * dry * (1.0 - math.tanh(0.5 * DRY_STEEP * abs(qd[i])))
             elastic[i] += min(max(elastic[i], -most), most)
 
 

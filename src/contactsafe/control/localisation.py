@@ -185,6 +185,8 @@ def _check(place: Record, handle: Record, known: Uncertainty) -> None:
     A single contact leaves n − 3 numbers free, and six more by a sensor under the base.
     """
     n = place.torque.shape[0]
+    if place.best < 0:
+        return
     link, told = min(place.link, n), n + (6.0 if place.base.told != 0 else 0.0)
     free = told - 3.0
     point, force = stack_vector(3), stack_vector(3)

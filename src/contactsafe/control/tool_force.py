@@ -37,15 +37,15 @@ def follow_tool_limit(tool: Record, arm: Record, work: Record, contact_n: float,
     the arm is resisted as any push on the arm; what the tool runs into is pressed no harder for it.
 
     Args:
-        tool: `tool_wrench_dtype` record, its force up to date; `pushed` is updated.
+        tool: `tool_wrench_dtype` record, its force up to date; `may_be_pushed` is updated.
         arm: of the state.
         work: `contact_work_dtype` record, up to date.
         contact_n: least force that counts as contact, N.
         params: of reaction.
     """
     if arm.has_wrench != 0 or dot(tool.force, tool.force) < contact_n * contact_n or work.taken_j > _PRESSED_J:
-        tool.pushed = 0
+        tool.may_be_pushed = 0
     elif is_active(work):
-        tool.pushed = 1
+        tool.may_be_pushed = 1
     resisted = max(params.tool_force_limit_n, params.reject_force_n)
-    return resisted if tool.pushed != 0 else params.tool_force_limit_n
+    return resisted if tool.may_be_pushed != 0 else params.tool_force_limit_n

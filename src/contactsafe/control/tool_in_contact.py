@@ -5,8 +5,9 @@ from a push that grows: one contact keeps its pattern over the joints, and a for
 
     y = α a + J_vᵀ f + e,    a: the contact's torque as it was at first.
 
-α and f are estimated by weighted least squares in every tick; a follows what neither explains. A push that turns is
-taken for the tool's in part, and resisted with less: that is the harmless side of the doubt.
+α and f are estimated by weighted least squares in every tick; a follows what neither explains, at the size it has had
+at most: there it is known best. A push that turns, or that turns as the arm moves, is taken for the tool's in part, and
+resisted with less: that is the harmless side of the doubt. An obstacle is not asked: its torque must all count.
 """
 
 import math
@@ -25,10 +26,12 @@ _KNOWN_S = 0.1
 """The pattern is learnt so long; what meets the tool meanwhile is taken for a part of the contact."""
 
 _OTHER = 60.0
-"""χ² from which on neither explains the torques: another contact, whose pattern is learnt anew."""
+"""χ² from which on neither explains the torques: another contact, whose pattern is learnt anew; what was the tool's
+stays the tool's meanwhile."""
 
-_LEAST_NM, _PATTERN = 0.1, 0.05
-"""Standard deviation of a torque beside its noise, and the fraction of it by which a pattern may be off."""
+_LEAST_NM, _UNMEASURED_NM, _PATTERN = 0.1, 0.25, 0.05
+"""Standard deviation of a torque beside its noise, of noise where it is not measured, and the fraction of the torque by
+which a pattern may be off."""
 
 _PRIOR_N = 40.0
 """Standard deviation of the force on a tool, before the torques are asked, N."""
@@ -113,5 +116,5 @@ def _explain(known: Record, torque: Vector, noise: Record, J_v: Matrix, rest: Ve
 @inlined
 def _variance(noise: Record, i: int, size: float) -> float:
     """Return the variance of joint i's torque, (N m)², where all of them have a size of so much, N m."""
-    sigma = noise.bandwidth * noise.sigma[i]
+    sigma = noise.bandwidth * noise.sigma[i] if noise.sigma[i] > 0.0 else _UNMEASURED_NM
     return _LEAST_NM**2 + sigma * sigma + (_PATTERN * size) ** 2

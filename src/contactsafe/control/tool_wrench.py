@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.control.codes import FREE
+from contactsafe.control.codes import FREE, REJECT
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
 from contactsafe.control.tool_in_contact import follow_tool_in_contact, forget_tool_in_contact, tool_in_contact_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
@@ -23,7 +23,7 @@ def tool_wrench_dtype(n: int) -> np.dtype:
             ("arm_torque", _f, (n,)),  # compensating residual less the tool's part, N m
             ("arm_torque_fast", _f, (n,)),  # the fast one less the tool's part, N m
             ("in_contact", tool_in_contact_dtype(n)),
-            ("pushed", _i),  # 1 where somebody pushes what may be the tool
+            ("may_be_pushed", _i),  # 1 where somebody pushes what may be the tool
         ]
     )
 
@@ -36,7 +36,7 @@ def separate_tool_wrench(
     J: Matrix,
     J_bar: Matrix,
     mode: int,
-    pushed: bool,
+    beside_tool: bool,
     step: Record,
     params: Record,
 ) -> None:
@@ -53,13 +53,13 @@ def separate_tool_wrench(
         J: task Jacobian, (6, n).
         J_bar: its dynamically consistent inverse, (n, 6).
         mode, step: in force.
-        pushed: whether somebody pushes the arm beside the tool.
+        beside_tool: whether somebody pushes the arm beside the tool.
         params: of identification.
     """
     n = detection_residual.shape[0]
     tau_tool, tau_met, tau_met_slow = stack_vector(n), stack_vector(n), stack_vector(n)
     met = tool.in_contact
-    if mode == FREE:
+    if mode != REJECT:
         forget_tool_in_contact(met)
     else:
         matvec_t_into(J, tool.wrench, tau_tool)
@@ -69,15 +69,15 @@ def separate_tool_wrench(
     for i in range(n):
         detection_residual[i] = observer.residual_fast[i] - tau_met[i]
     wrench = matvec_t_into(J_bar, detection_residual, stack_vector(6))
-    if mode == FREE and not pushed:
+    if mode == FREE and not beside_tool:
         observer_step(tool.wrench, step.tool_memory_gain, wrench)
     matvec_t_into(J, tool.wrench, tau_tool)
     for i in range(n):
         tool.arm_torque[i] = observer.residual[i] - tau_met_slow[i] - tau_tool[i]
         tool.arm_torque_fast[i] = detection_residual[i] - tau_tool[i]
-    if pushed:
+    if beside_tool:
         wrench[:] = tool.wrench
-    if pushed or not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
+    if beside_tool or not line_of_action_misses_tool(wrench, params.tool_radius_m, params.tool_moment_nm):
         matvec_t_into(J, wrench, tau_tool)
         for i in range(n):
             detection_residual[i] -= tau_tool[i]
@@ -86,6 +86,7 @@ def separate_tool_wrench(
 @inlined
 def take_all_for_the_arm(tool: Record, detection_residual: Vector, observer: Record) -> None:
     """Take all of the residual for the arm's contact: the tool's wrench is known, or nothing tells it apart."""
+    forget_tool_in_contact(tool.in_contact)
     detection_residual[:] = observer.residual_fast
     tool.arm_torque[:] = observer.residual
     tool.arm_torque_fast[:] = observer.residual_fast

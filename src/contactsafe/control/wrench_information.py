@@ -123,7 +123,8 @@ def marginalise_moment(G: Matrix, h: Vector, variance: float) -> float:
         for k in range(3):
             S[j, k] = variance * G[3 + j, 3 + k]
         S[j, j] += 1.0
-    spd_inverse(S, K)
+    if not spd_inverse(S, K):
+        K[:] = 0.0  # numbers that are none
     constant = -0.5 * math.log(_determinant(S))
     for k in range(3):
         Kh[k] = variance * (K[k, 0] * h[3] + K[k, 1] * h[4] + K[k, 2] * h[5])

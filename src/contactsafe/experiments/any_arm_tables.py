@@ -48,7 +48,7 @@ def model_rows(of: ModelArm, trials: Sequence[Trial]) -> list[tuple[str | float,
         spheres = [_pair(t.metrics, name) for name in ("fixed", "sprung")]
         figures = [t.metrics.get(name, math.nan) for name in ("hold_mm", "move_mm", "pushed_mm")]
         speed = t.metrics["joint_speed_peak_rad_s"]
-        rows.append((of.name, of.arm.n, t.controller, t.scenario, *figures, *spheres, speed, "loads"))
+        rows.append((of.name, of.arm.n, t.controller, t.scenario, *figures, *spheres, speed, of.notes or "loads"))
     return rows
 
 

@@ -72,7 +72,7 @@ def play(
         if push is not None:
             scene.push(push[0], push[1] * (PUSHED_S <= 0.001 * tick < PUSHED_S + PUSH_S))
         scene.step(out.torque)
-        at = controller.record["output"]["position"].copy()
+        at = scene.tool.copy()
         sound = np.isfinite(out.torque).all()
         rows.append((scene.q, scene.qd, at, out.contact.in_contact, scene.force_on_sphere(), position, sound))
     q, qd, tool, in_contact, force, asked, sounds = (np.array(column) for column in zip(*rows, strict=True))
@@ -107,7 +107,7 @@ def trial(of: ModelArm, config: ControllerConfig, with_wrench: bool, free: np.nd
         free: centre of the sphere in its path, (3,), m; None where there is none.
 
     Returns:
-        Figures by name; NaN where the arm cannot be asked.
+        Figures by name; those are missing that the arm cannot be asked for.
     """
     runs = [play(of, build_scene(of), config, with_wrench, hold_path(of), HOLD_S)]
     figures = {"hold_mm": 1000.0 * float(runs[0].error.max()), "false_contact": float(runs[0].in_contact.mean())}
@@ -125,18 +125,19 @@ def trial(of: ModelArm, config: ControllerConfig, with_wrench: bool, free: np.nd
         for name, stiffness in (("fixed", np.inf), ("sprung", SPRING_N_M)):
             swept = play(of, build_scene(of, free, stiffness), config, with_wrench, move_path(of), MOVE_S + SETTLE_S)
             runs.append(swept)
-            figures |= {
-                f"{name}_peak_n": float(swept.force.max()),
-                f"{name}_steady_n": float(swept.force[-500:].mean()),
-            }
-    figures["joint_speed_peak_rad_s"] = float(max(np.abs(run.qd).max() for run in runs))
-    figures["joint_speed_of_limit"] = float(max((np.abs(run.qd) / of.arm.qd_max).max() for run in runs))
-    figures["finite"] = float(all(run.finite and np.isfinite(run.q).all() for run in runs))
-    return figures
+            figures[f"{name}_peak_n"] = float(swept.force.max())
+            figures[f"{name}_steady_n"] = float(swept.force[-500:].mean())
+    figures["joint_speed_peak_rad_s"] = float(np.max([np.abs(run.qd).max() for run in runs]))
+    figures["not_finite"] = float(not all(run.finite and np.isfinite(run.q).all() for run in runs))
+    return {name: value if np.isfinite(value) else np.inf for name, value in figures.items()}
 
 
 def swept_sphere(of: ModelArm, config: ControllerConfig) -> np.ndarray | None:
-    """Return where a sphere is in the arm's path, (3,), m; None where it has none, or nothing of it goes anywhere."""
-    if not of.move.any() or not len(of.arm.surface):
+    """Return where a sphere is that the arm meets on its path, (3,), m; None where it meets none."""
+    if not of.move.any():
         return None
-    return sphere_in_path(of, play(of, build_scene(of), config, True, move_path(of), MOVE_S).q)
+    centre = sphere_in_path(of, play(of, build_scene(of), config, True, move_path(of), MOVE_S).q)
+    if centre is None:
+        return None
+    met = play(of, build_scene(of, centre), config, True, move_path(of), MOVE_S)
+    return centre if met.force.max() > 0.0 and met.force[0] == 0.0 else None

@@ -44,7 +44,8 @@ def calibrated(arm: Arm, calibration: Calibration | str | Path) -> Arm:
     model, friction, drag, unknown = copy.deepcopy(arm.model), arm.friction, arm.drag, arm.friction_unknown
     if known.losses is not None:
         friction, drag = known.losses.friction, known.losses.drag
-        unknown = unknown * (0.0, 1.0)  # at rest dry friction may still be anything
+        still = np.where(np.isnan(known.stiction), unknown[:, 1], np.minimum(unknown[:, 1], known.stiction))
+        unknown = np.column_stack([0.0 * still, still])  # at rest dry friction may still be anything
     if known.rotor is not None:
         model.dof_armature[:] = known.rotor
     load = known.payload if known.payload is not None and known.tool == tool_name(arm) else None

@@ -12,6 +12,9 @@ DRY_STEEP: Final = 40.0
 """How soon dry friction is there, s/rad: nearly all of it at 0.05 rad/s. A controller that compensates a steeper one
 chatters at rest."""
 
+FRICTION_FRACTION: Final = 0.8
+"""Of the friction that a file declares, what is in the model and compensated; more than there is drives a joint."""
+
 
 @compiled
 def joint_friction(parameters: Matrix, qd: Vector) -> Vector:

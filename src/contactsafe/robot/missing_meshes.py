@@ -1,5 +1,6 @@
 """Meshes that a downloaded model names and that are not where it says: found elsewhere, or left out with a note."""
 
+import glob
 import pathlib
 from typing import Any
 
@@ -21,7 +22,7 @@ def find_meshes(spec: mujoco.MjSpec, findings: Findings) -> None:
         findings: told of meshes that are left out, and of bodies that would lose their mass with them.
     """
     _paint_grey(spec)
-    missing = _not_found(spec)
+    missing = _not_found(spec, findings)
     for geom in [geom for geom in spec.geoms if geom.meshname in missing]:
         body = geom.parent
         if body.name != "world" and not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0:
@@ -36,16 +37,20 @@ def find_meshes(spec: mujoco.MjSpec, findings: Findings) -> None:
         )
 
 
-def _not_found(spec: mujoco.MjSpec) -> dict[str, Any]:
-    """Return the meshes whose files are nowhere, by name; those that are elsewhere are pointed to."""
+def _not_found(spec: mujoco.MjSpec, findings: Findings) -> dict[str, Any]:
+    """Return the meshes whose files are nowhere, by name; those that are elsewhere are pointed to, and told."""
     missing = {}
     for mesh in spec.meshes:
         if not mesh.file or _is_there(spec, spec.meshdir, mesh.file):
             continue
         name = pathlib.PurePath(mesh.file).name
-        found = sorted(pathlib.Path(spec.modelfiledir).rglob(name)) if spec.modelfiledir else []
+        found = sorted(pathlib.Path(spec.modelfiledir).rglob(glob.escape(name))) if spec.modelfiledir else []
         if found:
             mesh.file = str(found[0].resolve())
+            if len(found) > 1:
+                findings.note(
+                    f"of {len(found)} files called {name} the model takes {mesh.file}; put the right one there"
+                )
         else:
             missing[mesh.name or pathlib.PurePath(name).stem] = mesh
     return missing

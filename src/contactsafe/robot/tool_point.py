@@ -11,8 +11,8 @@ from contactsafe.robot.spec_parts import Flange, compiled_spec, name_all
 
 _HINGE, _FREE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_FREE)
 
-_FINGER = 2
-"""Hinges that a gripper's finger has at most: a hand is where nothing longer goes on, or several things do."""
+_FINGER, _OF_HAND = 2, 5
+"""Hinges that a gripper's finger has at most, and one of a hand of three fingers or more."""
 
 
 def find_tool(spec: mujoco.MjSpec) -> tuple[Flange, list[str]]:
@@ -28,7 +28,10 @@ def find_tool(spec: mujoco.MjSpec) -> tuple[Flange, list[str]]:
         InvalidInputError: there is no chain of two hinges.
     """
     name_all(spec)
-    find_meshes(spec, Findings())
+    findings = Findings()
+    find_meshes(spec, findings)
+    findings.raise_problems()
+    findings.warn(spec.modelname)
     model = compiled_spec(spec, "the MjSpec")
     body, hinges = 0, list[int]()
     while (follower := _followed(model, body, hinges)) is not None:
@@ -53,7 +56,8 @@ def _followed(model: mujoco.MjModel, body: int, hinges: list[int]) -> int | None
     if not followers:
         return None
     longest, first = max(followers)
-    if len(hinges) >= 2 and longest <= _FINGER and len(followers) > 1:
+    alike = sum(reach >= longest - 1 for reach, _ in followers)
+    if len(hinges) >= 2 and ((longest <= _FINGER and len(followers) > 1) or (longest <= _OF_HAND and alike > 2)):
         return None
     return -first
 

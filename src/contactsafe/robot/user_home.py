@@ -16,6 +16,9 @@ _KEY = mujoco.mjtObj.mjOBJ_KEY
 _TRIED, _INNER, _SHARES = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
 """Postures that are tried, the part of a range at either end that they keep away from, and how far towards them."""
 
+_NOTHING_M = 1e-6
+"""What the tool moves by rounding alone, m: an arm of parallel axes never moves it to all sides."""
+
 _READY = 0.4
 """Part of the best readiness from which on a posture will do."""
 
@@ -111,6 +114,8 @@ def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel,
     data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
     for i, q in enumerate(postures):
         readiness[i] = _readiness(nominal, data, q, limits)
+    if readiness[0] >= _READY * readiness.max():
+        return middle
     ready = _READY * readiness.max()
     between = [middle + share * (q - middle) for q in postures[readiness >= ready] for share in _SHARES]
     distance = [float(np.linalg.norm((q - middle) / (high - low))) for q in between]
@@ -125,7 +130,8 @@ def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel,
 def _readiness(nominal: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, limits: np.ndarray) -> float:
     """Return how far the tool moves at least for a radian of all joints, m; 0 where gravity takes half the torque."""
     data.qpos[:], data.qvel[:] = q, 0.0
-    mujoco.mj_forward(nominal, data)
+    mujoco.mj_fwdPosition(nominal, data)
+    mujoco.mj_fwdVelocity(nominal, data)
     if (np.abs(data.qfrc_bias) > 0.5 * limits).any():
         return 0.0
     return least_reach(nominal, data)
@@ -136,7 +142,8 @@ def least_reach(nominal: mujoco.MjModel, data: mujoco.MjData) -> float:
     J = np.zeros((6, nominal.nv))
     mujoco.mj_jacSite(nominal, data, J[:3], J[3:], 0)
     J[3:] *= 0.5
-    return float(np.linalg.svd(J, compute_uv=False)[-1])
+    found = np.linalg.svd(J, compute_uv=False)
+    return float(found[-1]) if found[-1] > _NOTHING_M else 0.0
 
 
 def touching(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> list[str]:

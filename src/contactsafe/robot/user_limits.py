@@ -8,11 +8,8 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.arm import finite_array
 from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.findings import Findings
-from contactsafe.robot.friction import DRY_STEEP
+from contactsafe.robot.friction import DRY_STEEP, FRICTION_FRACTION
 from contactsafe.robot.names import JOINT, label, numbered, several
-
-FRICTION_FRACTION = 0.8
-"""Of the friction that a file declares, what is in the model and compensated; more than there is drives a joint."""
 
 _CHANGE, _TICK_S = 0.1, 1e-3
 """Part of a joint's speed that compensation of friction may change in one tick."""

@@ -1,18 +1,22 @@
 """Models of arms as people download them: made torque-driven, and set into a scene with something in their path."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from contactsafe.core.errors import InvalidInputError, shown
+from contactsafe.core.errors import InvalidInputError, ModelWarning, shown
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.binding import Binding
+from contactsafe.robot.bodies import link_of
+from contactsafe.robot.findings import Findings
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.spec_parts import Flange, remove
 from contactsafe.robot.tool_point import find_tool
+from contactsafe.robot.user_home import key_frame
 
 MOVES_M = 0.1
 """How far the tool moves."""
@@ -36,7 +40,8 @@ class ModelArm:
         arm: in it.
         move: of the tool, world, (3,), m; zeros where it reaches nothing 10 cm away.
         q_end: joint positions at the end of the move, (n,), rad.
-        floor: below the arm's base, world, (3,), m.
+        others: positions of the joints that are not the arm's, as its model has them, by name.
+        notes: what is to be known of the model, in a line; empty for nothing.
     """
 
     name: str
@@ -44,13 +49,15 @@ class ModelArm:
     arm: Arm
     move: np.ndarray
     q_end: np.ndarray
-    floor: np.ndarray
+    others: dict[str, np.ndarray]
+    notes: str
 
 
 def load_model(place: str) -> ModelArm:
     """Load an arm by PATH, or by PATH:TOOL where TOOL is a site, a body, or a link of a URDF.
 
-    Without TOOL it is the end of the longest chain of hinges. Joints that are not the arm's are locked where they are.
+    Without TOOL it is the end of the longest chain of hinges; a URDF needs one. Joints that are not the arm's are
+    locked where its model has them, but for those of free bodies.
 
     Raises:
         InvalidInputError: there is no such file, or its arm cannot be driven; with all reasons.
@@ -65,12 +72,15 @@ def load_model(place: str) -> ModelArm:
     else:
         spec = _read(path)
         site, joints = _tool_of(spec, tool)
-    made = robots.make_torque_driven(spec, site, joints)
-    arm = robots.from_mjcf(spec, made, joints)
-    _lock_others(spec, arm)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", ModelWarning)
+        made = robots.make_torque_driven(spec, site, joints)
+        arm = robots.from_mjcf(spec, made, joints)
+    others = _lock_others(spec, arm)
     move, q_end = _choose_move(arm)
     name = f"{path.parent.name}/{path.stem}" + (f":{tool}" if tool else "")
-    return ModelArm(name, spec, arm, move, q_end, arm.model.body_pos[1].copy())
+    notes = "; ".join(str(one.message) for one in told if issubclass(one.category, ModelWarning))
+    return ModelArm(name, spec, arm, move, q_end, others, notes)
 
 
 def _split(place: str) -> tuple[Path, str]:
@@ -98,13 +108,20 @@ def _tool_of(spec: mujoco.MjSpec, tool: str) -> tuple[str | Flange, list[str] | 
     return (tool if spec.site(tool) is not None else Flange(tool)), None
 
 
-def _lock_others(spec: mujoco.MjSpec, arm: Arm) -> None:
-    """Let joints that are not the arm's hardly move: the arm's model has them locked."""
+def _lock_others(spec: mujoco.MjSpec, arm: Arm) -> dict[str, np.ndarray]:
+    """Let joints that are not the arm's hardly move, for its model has them locked; return where."""
     own = {arm.model.joint(i).name for i in range(arm.n)}
     for joint in spec.joints:
         if joint.name not in own and joint.type != mujoco.mjtJoint.mjJNT_FREE:
             joint.damping = _linear(joint.damping, _STUCK)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model = spec.compile()
+    data, chain = mujoco.MjData(model), [model.joint(name).id for name in own]
+    key = key_frame(model, sorted(chain), None, Findings())
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    return {name: data.joint(name).qpos.copy() for name in names if name not in own}
 
 
 def _choose_move(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
@@ -133,12 +150,21 @@ class Scene:
         data: at the arm's home, everything else where the file has it.
         at: where the arm is in it.
         sphere: its geom; -1 for none.
+        site: the tool point.
+        base: bodies that the arm cannot move.
     """
 
     model: mujoco.MjModel
     data: mujoco.MjData
     at: Binding
     sphere: int
+    site: str
+    base: np.ndarray
+
+    @property
+    def tool(self) -> np.ndarray:
+        """Where the tool point is, world, (3,), m."""
+        return self.data.site(self.site).xpos
 
     @property
     def q(self) -> np.ndarray:
@@ -166,7 +192,7 @@ class Scene:
         wrench, total = np.zeros(6), np.zeros(3)
         for i in range(self.data.ncon):
             contact = self.data.contact[i]
-            if self.sphere in contact.geom:
+            if self.sphere in contact.geom and not self.base[self.model.geom_bodyid[contact.geom]].any():
                 mujoco.mj_contactForce(self.model, self.data, i, wrench)
                 sign = 1.0 if contact.geom[1] == self.sphere else -1.0
                 total += sign * contact.frame.reshape(3, 3).T @ wrench[:3]
@@ -188,9 +214,17 @@ def build_scene(of: ModelArm, centre: np.ndarray | None = None, stiffness: float
         _add_sphere(spec, centre, stiffness)
     model = spec.compile()
     data, at = mujoco.MjData(model), of.arm.bind(model)
+    for name, position in of.others.items():
+        data.joint(name).qpos[:] = position
     data.qpos[at.qpos] = of.arm.home
     mujoco.mj_forward(model, data)
-    return Scene(model, data, at, -1 if centre is None else model.geom("met_sphere").id)
+    chain = [model.joint(of.arm.model.joint(i).name).id for i in range(of.arm.n)]
+    moved = link_of(model, chain) > 0
+    base = ~moved
+    if centre is None:
+        return Scene(model, data, at, -1, of.arm.site, base)
+    base[model.body("met").id] = False
+    return Scene(model, data, at, model.geom("met_sphere").id, of.arm.site, base)
 
 
 def _add_sphere(spec: mujoco.MjSpec, centre: np.ndarray, stiffness: float) -> None:
@@ -225,6 +259,8 @@ def sphere_in_path(of: ModelArm, q: np.ndarray) -> np.ndarray | None:
     """
     arm, halfway = of.arm, len(q) // 2
     surface = arm.surface[arm.surface[:, 0] > arm.n // 2]
+    if not len(surface):
+        return None
     data = mujoco.MjData(arm.model)
     frames = []
     for tick in (0, halfway, halfway + len(q) // 10):
@@ -239,7 +275,7 @@ def sphere_in_path(of: ModelArm, q: np.ndarray) -> np.ndarray | None:
     outwards = np.einsum("pi,pi->p", later - points, normals)
     clear = np.array([np.linalg.norm(first - centre, axis=1).min() > SPHERE_M + _CLEAR_M for centre in centres])
     outwards[~clear] = -1.0
-    return centres[outwards.argmax()] if len(outwards) and outwards.max() > 0.002 else None
+    return centres[outwards.argmax()] if outwards.max() > 0.002 else None
 
 
 def pushed_at(of: ModelArm) -> tuple[str, np.ndarray]:
@@ -255,7 +291,7 @@ def pushed_at(of: ModelArm) -> tuple[str, np.ndarray]:
     mujoco.mj_forward(arm.model, data)
     body = int(arm.model.jnt_bodyid[joint])
     mujoco.mj_jacBodyCom(arm.model, data, J, None, body)
-    left = arm.tau_max - np.abs(data.qfrc_bias)
+    left = np.maximum(arm.tau_max - np.abs(data.qfrc_bias), 0.0)
     holds = [(left / np.maximum(np.abs(J.T @ side), 1e-9)).min() for side in np.eye(3)[:2]]
     side = int(np.argmin(holds))
     return arm.model.joint(joint).name, min(25.0, 0.1 * holds[side]) * np.eye(3)[side]
