@@ -119,7 +119,9 @@ def test_options_left_out_are_those_of_the_experiment(entry):
     assert (config.task is not None) == ("task" in entry.takes)
 
 
-OPTIONS = {"task": "insertion", "bundle": "folder", "plants": "clean", "sensors": "franka", "minutes": "2"}
+OPTIONS = {
+    "task": "insertion", "bundle": "folder", "plants": "clean", "sensors": "franka", "minutes": "2", "models": "a.xml",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("entry", ENTRIES.values(), ids=ENTRIES)

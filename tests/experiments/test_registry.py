@@ -9,6 +9,7 @@ import contactsafe
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.experiments import (
     adversarial,
+    any_arm,
     clock,
     collisions,
     detection,
@@ -22,9 +23,11 @@ from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.experiments.registry import ENTRIES, PAPER, by_name
 from contactsafe.tasks.wiping.scenes import Wiping
 
-MODULES = (task_safety, joint_safety, disturbance, collisions, detection, pushes, localisation, adversarial, clock)
+MODULES = (
+    task_safety, joint_safety, disturbance, collisions, detection, pushes, localisation, adversarial, clock, any_arm,
+)  # fmt: skip
 ROOMS = Path(contactsafe.__file__).parent
-CONFIG = ExperimentConfig(("vices", "safe"), trials=3, plants=("real", "clean"), minutes=1.0)
+CONFIG = ExperimentConfig(("vices", "safe"), trials=3, plants=("real", "clean"), minutes=1.0, models=("a", "b"))
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.NAME)
@@ -55,7 +58,7 @@ def test_entries_go_by_their_own_names():
 @pytest.mark.parametrize(
     ("name", "count"),
     [("task-safety", 6), ("joint-safety", 12), ("disturbance", 36), ("collisions", 12), ("detection", 9),
-     ("pushes", 12), ("localisation", 36), ("adversarial", 6), ("clock", 1056)],
+     ("pushes", 12), ("localisation", 72), ("adversarial", 6), ("clock", 1056), ("robots", 8)],
 )  # fmt: skip
 def test_entries_count_the_trials_of_a_configuration(name, count):
     assert by_name(name).count(CONFIG) == count
@@ -66,7 +69,7 @@ def test_an_unknown_experiment_is_told_with_all_there_are():
         by_name("dancing")
     assert str(caught.value) == (
         "experiment 'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, detection, "
-        "pushes, localisation, adversarial, clock"
+        "pushes, localisation, adversarial, clock, robots"
     )
 
 
