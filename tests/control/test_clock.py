@@ -492,7 +492,7 @@ def test_no_number_in_any_field_raises_or_gives_more_torque_than_allowed(panda, 
                 field = records[0][group][name]
                 if data.draw(st.integers(0, 3)) > 0:
                     continue
-                if name in ("has_wrench", "has_torque", "has_time", "kept"):
+                if name in ("has_wrench", "has_torque", "has_base", "has_time", "kept"):
                     records[0][group][name] = data.draw(st.integers(0, 1))
                 elif np.ndim(field) == 0 or data.draw(st.booleans()):
                     records[0][group][name] = data.draw(NUMBERS)
@@ -505,7 +505,7 @@ def test_no_number_in_any_field_raises_or_gives_more_torque_than_allowed(panda, 
             assert (np.abs(torque) <= panda.tau_max).all()
             assert np.abs(torque - before).max() <= 1.0
             before = torque
-    for stage in ("arm", "observer", "detection", "tool_wrench", "link_masses", "impedance", "limits"):
+    for stage in ("arm", "observer", "base", "detection", "tool_wrench", "link_masses", "impedance", "limits"):
         for name in records[0]["state"][stage].dtype.names:
             field = records[0]["state"][stage][name]
             assert field.dtype.names or np.isfinite(field).all()

@@ -192,8 +192,8 @@ def test_sets_hold_the_truth_as_often_as_they_claim_and_shrink_as_the_arm_moves(
 def test_the_wrench_at_the_base_narrows_what_is_believed(seed):
     touch, q, torque, (origins, rotations) = of_one(seed)
     scene = sample_touch_scene(ARM, seed, 1)
-    felt, sigma = np.concatenate([torque, true_base_wrench(ARM, scene, q)]), np.repeat([0.1, 0.5, 0.05], [7, 3, 3])
-    without, told = belief(SURFACE, [q], [torque], 0.1, 0.0), belief(SURFACE, [q], [felt], sigma, 0.0)
+    felt, sigma = np.concatenate([torque, true_base_wrench(ARM, scene, q)]), np.repeat([0.5, 0.5, 0.05], [7, 3, 3])
+    without, told = belief(SURFACE, [q], [torque], 0.5, 0.0), belief(SURFACE, [q], [felt], sigma, 0.0)
     assert len(told.likeliest(0.95)) < len(without.likeliest(0.95))
     point, force = touch.in_world(origins, rotations)
     found = force_at(ARM, q, (touch.link, point, rotations[touch.link] @ touch.inwards), felt, sigma)
