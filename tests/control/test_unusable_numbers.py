@@ -156,7 +156,7 @@ def test_random_nonsense_never_gives_a_torque_that_is_not_finite(panda):
         c = records[0]
         for group in ("measurement", "target"):
             for name in c[group].dtype.names:
-                if name not in ("has_wrench", "has_torque", "has_time", "kept") and rng.random() < 0.3:
+                if name not in ("has_wrench", "has_torque", "has_base", "has_time", "kept") and rng.random() < 0.3:
                     scale = 10.0 ** rng.integers(-300, 300)
                     c[group][name] = rng.choice([0.0, 1.0, scale, np.nan, np.inf], c[group][name].shape)
         c["measurement"]["has_wrench"] = rng.integers(2)
