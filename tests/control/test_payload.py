@@ -82,7 +82,8 @@ def test_a_load_never_sinks_in_silence(panda, preset, sensor):
 
 
 def test_a_load_that_scales_the_task_down_is_named(panda):
-    plant, controller = Loaded(panda, 3.0), controller_at(panda, SAFE)
+    """It weighs more than what a push is resisted with."""
+    plant, controller = Loaded(panda, 7.0), controller_at(panda, SAFE)
     out = settle(plant, controller, hold(panda), 1500)[-1]
     assert {"tool force", "load"} <= set(out.limited_by)
 

@@ -63,13 +63,13 @@ def test_file_that_mujoco_cannot_read_is_refused_by_name(tmp_path):
 
 
 def test_joints_that_are_not_the_arms_stay_where_they_are(tmp_path):
-    slide = '<body name="lift"><joint name="lift" type="slide" axis="0 0 1"/><geom size="0.1" mass="5"/></body>'
+    slide = '<body name="cart"><joint name="cart" type="slide" axis="0 0 1"/><geom size="0.1" mass="5"/></body>'
     path = with_parts(tmp_path, ("<worldbody>", f"<worldbody>{slide}"), ("<keyframe>", "<!--"), ("</keyframe>", "-->"))
     of = load_model(path)
     scene = build_scene(of)
     for _ in range(500):
         scene.step(np.zeros(of.arm.n))
-    assert abs(scene.data.joint("lift").qpos[0]) < 1e-3
+    assert abs(scene.data.joint("cart").qpos[0]) < 1e-3
     assert np.abs(scene.q - of.arm.home).max() > 0.1  # the arm does fall
 
 

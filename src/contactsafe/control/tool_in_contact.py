@@ -7,7 +7,7 @@ from a push that grows: one contact keeps its pattern over the joints, and a for
 
 α and f are estimated by weighted least squares in every tick; a follows what neither explains, at the size it has had
 at most: there it is known best. A push that turns, or that turns as the arm moves, is taken for the tool's in part, and
-resisted with less: that is the harmless side of the doubt. An obstacle is not asked: its torque must all count.
+resisted with less: that is the harmless side of the doubt.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactsafe.control.codes import FREE, REJECT
+from contactsafe.control.codes import FREE
 from contactsafe.control.laws import line_of_action_misses_tool, observer_step
 from contactsafe.control.tool_in_contact import follow_tool_in_contact, forget_tool_in_contact, tool_in_contact_dtype
 from contactsafe.core.arrays import Matrix, Record, Vector
@@ -59,7 +59,7 @@ def separate_tool_wrench(
     n = detection_residual.shape[0]
     tau_tool, tau_met, tau_met_slow = stack_vector(n), stack_vector(n), stack_vector(n)
     met = tool.in_contact
-    if mode != REJECT:
+    if mode == FREE:
         forget_tool_in_contact(met)
     else:
         matvec_t_into(J, tool.wrench, tau_tool)

@@ -109,6 +109,8 @@ def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel,
     limited = model.jnt_limited[chain].astype(bool)
     low, high = (np.where(limited, model.jnt_range[chain, end], (-np.pi, np.pi)[end]) for end in (0, 1))
     middle, n = 0.5 * (low + high), len(chain)
+    if not np.isfinite(high - low).all():
+        return middle  # the arm is refused for that
     rng = np.random.default_rng(0)
     postures = np.vstack([middle, rng.uniform(low + _INNER * (high - low), high - _INNER * (high - low), (_TRIED, n))])
     data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
