@@ -63,7 +63,8 @@ def test_file_that_mujoco_cannot_read_is_refused_by_name(tmp_path):
 
 
 def test_joints_that_are_not_the_arms_stay_where_they_are(tmp_path):
-    slide = '<body name="cart"><joint name="cart" type="slide" axis="0 0 1"/><geom size="0.1" mass="5"/></body>'
+    shape = '<geom type="sphere" size="0.1" mass="5" contype="0" conaffinity="0"/>'
+    slide = f'<body name="cart"><joint name="cart" type="slide" axis="0 0 1"/>{shape}</body>'
     path = with_parts(tmp_path, ("<worldbody>", f"<worldbody>{slide}"), ("<keyframe>", "<!--"), ("</keyframe>", "-->"))
     of = load_model(path)
     scene = build_scene(of)
