@@ -28,7 +28,7 @@ def test_arm_of_a_file_is_stable_arrives_and_is_gentle(battery):
         assert safe.metrics["not_finite"] == 0.0
         assert safe.metrics["hold_mm"] < 1.0
         assert safe.metrics["move_mm"] < 2.0
-        assert safe.metrics["harder"] == safe.metrics["pushed_further"] == 0.0
+        assert safe.metrics["peak_regression"] == safe.metrics["pushed_further"] == 0.0
         assert safe.metrics["sprung_peak_n"] < vices.metrics["sprung_peak_n"]
 
 
@@ -67,9 +67,9 @@ def test_worse_than_the_baseline_is_told_model_by_model():
         Trial("s", "safe", 1, figures),
     ]
     one, other, without = (trial.metrics for trial in compared(trials))
-    assert (one["pushed_further"], one["harder"]) == (0.0, 0.0)
-    assert (other["pushed_further"], other["harder"]) == (1.0, 1.0)
-    assert "harder" not in without
+    assert (one["pushed_further"], one["peak_regression"]) == (0.0, 0.0)
+    assert (other["pushed_further"], other["peak_regression"]) == (1.0, 1.0)
+    assert "peak_regression" not in without
 
 
 def test_sphere_is_clear_of_the_arm_at_first_and_met_on_the_way():

@@ -145,9 +145,9 @@ def posture_torques_into(
 def overcome_stiction(elastic: Vector, qd: Vector, arm: Record) -> None:
     """Add to an elastic torque in place what dry friction is known to keep from the links: in the torque's direction.
 
-    At rest the velocity does not say which way friction acts, but it is against what would move the joint. Added is as
-    much again as is asked for, up to a part of the friction: never more than holds the joint by itself. In motion it
-    fades: then friction is compensated by velocity.
+    At rest the velocity does not say in which direction friction acts, but it is against what would move the joint.
+    Added is as much again as is asked for, up to a part of the friction: never more than holds the joint by itself. In
+    motion it fades: then friction is compensated by velocity.
 
     Args:
         elastic: of task and posture, (n,), N m; updated.

@@ -34,7 +34,7 @@ def follow_tool_limit(tool: Record, arm: Record, work: Record, contact_n: float,
     """Return what the tool may press with, N: as much as a push is resisted with, where one may be at the tool.
 
     Without a sensor a push on the arm whose line passes the tool is like a contact of the tool. One that does work on
-    the arm is resisted as any push on the arm; what the tool runs into is pressed no harder for it.
+    the arm is resisted as any push on the arm; what the tool runs into is pressed with no more for it.
 
     Args:
         tool: `tool_wrench_dtype` record, its force up to date; `may_be_pushed` is updated.

@@ -108,9 +108,9 @@ def _explain(known: Record, torque: Vector, noise: Record, J_v: Matrix, rest: Ve
         known.known_s = 0.0
         return
     known.force[:] = x[1:]
-    share = max(x[0], 1.0)
+    scale = max(x[0], 1.0)
     for i in range(n):
-        pattern[i] = share * pattern[i] + gain * rest[i]
+        pattern[i] = scale * pattern[i] + gain * rest[i]
 
 
 @inlined

@@ -33,7 +33,7 @@ METRICS = (
     Metric("fixed_steady_n", "the same, steady", "N"),
     Metric("sprung_peak_n", "sphere on springs: force, peak", "N", main=True),
     Metric("sprung_steady_n", "the same, steady", "N", main=True),
-    Metric("harder", "pressed harder than under the baseline", main=True, aim=ZERO),
+    Metric("peak_regression", "a larger force than under the baseline", main=True, aim=ZERO),
     Metric("false_contact", "contact reported where there is none, part of the time", main=True, aim=ZERO),
     Metric("joint_speed_peak_rad_s", "joint speed, peak", "rad/s"),
     Metric("not_finite", "numbers that are not finite", main=True, aim=ZERO),

@@ -9,7 +9,7 @@ from contactsafe.results.metrics import BASELINE
 from contactsafe.sim.model_scenes import MOVES_M, SPHERE_M, ModelArm
 
 FURTHER_MM, FURTHER = 2.0, 1.2
-HARDER_N, HARDER = 5.0, 1.05
+LARGER_N, LARGER = 5.0, 1.05
 """A trial is worse than the baseline's by both: so much, and this multiple."""
 
 NOTE = (
@@ -18,8 +18,8 @@ NOTE = (
     f"{SPHERE_M:g} m in the path of the arm's outer half, fixed or on springs of {SPRING_N_M:g} N/m; peak / steady. "
     "With a wrench the "
     "controller is told that nothing touches the tool. '-': the joints do not allow it, or nothing of the arm meets "
-    f"anything. Further: by {FURTHER_MM:g} mm and {100 * (FURTHER - 1):.0f} %; harder: by {HARDER_N:g} N and "
-    f"{100 * (HARDER - 1):.0f} %."
+    f"anything. Further: by {FURTHER_MM:g} mm and {100 * (FURTHER - 1):.0f} %; larger force: by {LARGER_N:g} N and "
+    f"{100 * (LARGER - 1):.0f} %."
 )
 
 
@@ -37,8 +37,8 @@ def _against(mine: Mapping[str, float], baseline: Mapping[str, float]) -> dict[s
         return {}
     further = mine["pushed_mm"] > FURTHER * baseline["pushed_mm"] + FURTHER_MM
     peaks = [name for name in ("fixed_peak_n", "sprung_peak_n") if name in mine and name in baseline]
-    harder = any(mine[name] > HARDER * baseline[name] + HARDER_N for name in peaks)
-    return {"pushed_further": float(further), "harder": float(harder)}
+    larger = any(mine[name] > LARGER * baseline[name] + LARGER_N for name in peaks)
+    return {"pushed_further": float(further), "peak_regression": float(larger)}
 
 
 def model_rows(of: ModelArm, trials: Sequence[Trial]) -> list[tuple[str | float, ...]]:

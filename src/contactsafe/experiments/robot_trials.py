@@ -14,7 +14,7 @@ from contactsafe.sim.model_scenes import ModelArm, Scene, build_scene, pushed_at
 STIFFNESS = np.array([150.0] * 3 + [450.0] * 3)
 HOLD_S, MOVE_S, SETTLE_S, PUSHED_S, PUSH_S = 3.0, 2.0, 1.0, 0.5, 1.5
 SPRING_N_M = 5000.0
-"""Of the sphere that gives way."""
+"""Of the sphere that is on springs."""
 
 Path = Callable[[float], tuple[np.ndarray, np.ndarray]]
 """From time, s, to where x_d is, (3,), m, and the posture, (n,), rad."""
@@ -91,8 +91,8 @@ def move_path(of: ModelArm) -> Path:
 
     def at(time: float) -> tuple[np.ndarray, np.ndarray]:
         s = min(time / MOVE_S, 1.0)
-        share = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-        return start + share * of.move, of.arm.home + share * (of.q_end - of.arm.home)
+        fraction = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        return start + fraction * of.move, of.arm.home + fraction * (of.q_end - of.arm.home)
 
     return at
 

@@ -13,7 +13,7 @@ from contactsafe.robot.names import BODY, JOINT, label, listed
 
 _KEY = mujoco.mjtObj.mjOBJ_KEY
 
-_TRIED, _INNER, _SHARES = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
+_TRIED, _INNER, _PARTS = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
 """Postures that are tried, the part of a range at either end that they keep away from, and how far towards them."""
 
 _NOTHING_M = 1e-6
@@ -119,7 +119,7 @@ def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel,
     if readiness[0] >= _READY * readiness.max():
         return middle
     ready = _READY * readiness.max()
-    between = [middle + share * (q - middle) for q in postures[readiness >= ready] for share in _SHARES]
+    between = [middle + part * (q - middle) for q in postures[readiness >= ready] for part in _PARTS]
     distance = [float(np.linalg.norm((q - middle) / (high - low))) for q in between]
     scene = mujoco.MjData(model)
     for i in np.argsort(distance, kind="stable"):

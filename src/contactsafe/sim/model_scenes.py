@@ -130,9 +130,9 @@ def _choose_move(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
     best = (0.0, np.zeros(3), arm.home.copy())
     for move in MOVES_M * np.concatenate([np.eye(3), -np.eye(3)]):
         seed = arm.home.copy()
-        for share in np.linspace(0.2, 1.0, 5):
+        for fraction in np.linspace(0.2, 1.0, 5):
             error, turn = solve_ik(
-                nominal.handle, start.position + share * move, start.quat, seed, arm.q_min, arm.q_max, q
+                nominal.handle, start.position + fraction * move, start.quat, seed, arm.q_min, arm.q_max, q
             )
             seed = q.copy()
         room = float(np.minimum(q - arm.q_min, arm.q_max - q).min())
