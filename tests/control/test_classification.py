@@ -2,8 +2,11 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.control.plant import controller_at
 
-from contactsafe.control.classification import goes_on, is_stiff
+from contactsafe import presets
+from contactsafe.control.classification import _advance, _comes_back, goes_on, is_stiff
+from contactsafe.core.compiled import compiled
 
 SOFTEST = 1500.0
 SPRING = 0.0
@@ -59,3 +62,25 @@ def test_no_obstacle_is_softer_than_that(stiffness, lever, torque, receded):
     displacement = receded * torque / spring
     taken = 0.5 * torque * torque / spring
     assert not goes_on(spring * displacement, displacement, torque, taken, SOFTEST * lever**2, 0.0)
+
+
+@compiled
+def _come_back(c, work, displacement, far):
+    classification = c.state.classification
+    classification.displacement_smooth_rad, classification.displacement_rad = displacement, displacement
+    if _comes_back(classification, far):
+        _advance(classification, work, 0.01)
+
+
+def test_push_that_follows_the_arm_as_it_comes_back_is_asked_anew(panda):
+    """Measured from the peak of the impact, its torque seemed to have fallen, and it was never named again."""
+    controller = controller_at(panda, presets.safe())
+    c, state = controller.record, controller.record["state"]["classification"]
+    state["reference_nm"], state["torque_smooth_nm"] = 9.0, 6.0
+    for displacement in (0.05, 0.10, 0.098):  # it recedes, and comes back by less than counts
+        _come_back(c, 0.3, displacement, 0.01)
+        assert state["reference_nm"] == 9.0
+    _come_back(c, 0.3, 0.08, 0.01)
+    assert state["reference_nm"] == 6.0
+    assert state["reference_j"] == 0.3
+    assert state["displacement_smooth_rad"] == 0.0

@@ -12,7 +12,8 @@ from contactsafe.experiments.any_arm_tables import compared
 from contactsafe.experiments.config import ExperimentConfig
 from contactsafe.report import write_report
 from contactsafe.results.experiment import Trial
-from contactsafe.sim.model_scenes import build_scene, load_model, pushed_at, sphere_in_path
+from contactsafe.sim.model_arms import load_model, pushed_at
+from contactsafe.sim.model_scenes import build_scene, sphere_in_path
 
 SERVO_ARM = str(Path(__file__).parents[2] / "examples" / "servo_arm.xml")
 

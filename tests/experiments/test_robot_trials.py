@@ -16,7 +16,8 @@ from contactsafe.experiments.robot_trials import (
     swept_sphere,
     trial,
 )
-from contactsafe.sim.model_scenes import MOVES_M, SPHERE_M, build_scene, load_model, pushed_at
+from contactsafe.sim.model_arms import MOVES_M, load_model, pushed_at
+from contactsafe.sim.model_scenes import SPHERE_M, build_scene
 
 FILE = Path(__file__).parents[2] / "examples" / "servo_arm.xml"
 

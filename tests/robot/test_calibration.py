@@ -183,3 +183,12 @@ def test_the_estimator_takes_a_sensors_bias_off(arm):
         shown.append(abs(contact.torque[1]))
     assert shown[0] > 0.1
     assert shown[1] < 1e-6
+
+
+def test_dry_friction_at_rest_is_what_was_identified_and_no_more_than_the_file_says(arm):
+    """A controller overcomes it at rest: more than there is would drive the joints."""
+    declared = replace(arm, friction_unknown=np.tile([0.1, 0.8], (arm.n, 1)))
+    stiction = np.array([0.5, 1.5, np.nan, 0.5, 0.5, 0.5, 0.5])
+    found = robots.calibrated(declared, known(stiction=stiction))
+    np.testing.assert_array_equal(found.friction_unknown[:, 1], [0.5, 0.8, 0.8, 0.5, 0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(found.friction_unknown[:, 0], 0.0)

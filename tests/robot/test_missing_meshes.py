@@ -7,6 +7,7 @@ from tests.robot.test_urdf_meshes import _TETRAHEDRON
 
 from contactsafe import robots
 from contactsafe.core.errors import InvalidInputError, ModelWarning
+from contactsafe.sim.model_arms import load_model
 
 SEEN = '<geom type="mesh" mesh="part" mass="0"/>'
 ASSET = '<asset><mesh name="part" file="part.obj"/></asset><worldbody>'
@@ -37,3 +38,19 @@ def test_mesh_that_a_body_has_its_mass_from_is_asked_for(tmp_path):
     path = write(tmp_path, '<geom type="mesh" mesh="part"/>')
     with pytest.raises(InvalidInputError, match=r"^body 'upper' has its mass from a mesh that is not there; get the"):
         robots.from_mjcf(path, FLANGE, actuators="torque")
+
+
+def test_mesh_of_the_mass_is_asked_for_as_well_where_the_tool_is_searched_for(tmp_path):
+    """It was taken off in silence, and the arm loaded without that mass."""
+    path = write(tmp_path, '<geom type="mesh" mesh="part"/>')
+    with pytest.raises(InvalidInputError, match=r"^body 'upper' has its mass from a mesh that is not there; get the"):
+        load_model(str(path))
+
+
+@pytest.mark.filterwarnings("ignore:arm:UserWarning")
+def test_one_of_several_meshes_of_a_name_is_taken_with_a_note(tmp_path):
+    for folder in ("left", "right"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "part.obj").write_text(_TETRAHEDRON, encoding="utf-8")
+    with pytest.warns(ModelWarning, match=r"of 2 files called part\.obj the model takes .*left.*part\.obj"):
+        robots.from_mjcf(write(tmp_path, SEEN), FLANGE, actuators="torque")

@@ -94,3 +94,20 @@ def test_effort_that_is_missing_is_taken_from_the_caller(tmp_path):
     path = write(tmp_path, "../meshes/part.obj")
     path.write_text(path.read_text(encoding="utf-8").replace('effort="120"', 'effort="0"'), encoding="utf-8")
     assert_array_equal(robots.from_urdf(path, "l6", tau_max=np.full(6, 110.0), home=HOME).tau_max, 110.0)
+
+
+def test_root_link_does_not_collide_with_the_link_on_it(tmp_path):
+    """MuJoCo has the root link's shape in the world, which its own filter of neighbours leaves out."""
+    box = '<collision><geometry><box size="0.2 0.2 0.4"/></geometry></collision></link>'
+    path = write(tmp_path, "../meshes/part.obj")
+    text = path.read_text(encoding="utf-8")
+    for name in ("l0", "l1"):
+        head, _, rest = text.partition(f'<link name="{name}">')
+        text = f'{head}<link name="{name}">' + rest.replace("</link>", box, 1)
+    path.write_text(text, encoding="utf-8")
+    spec, _ = robots.urdf_spec(path, "l6")
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    touching = {tuple(sorted(int(model.geom_bodyid[g]) for g in data.contact[i].geom)) for i in range(data.ncon)}
+    assert (model.body("world").id, model.body("l1").id) not in touching

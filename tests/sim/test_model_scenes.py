@@ -9,7 +9,8 @@ import pytest
 from contactsafe import robots
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.urdf import arm_urdf
-from contactsafe.sim.model_scenes import SPHERE_M, build_scene, load_model, pushed_at
+from contactsafe.sim.model_arms import load_model, pushed_at
+from contactsafe.sim.model_scenes import SPHERE_M, build_scene
 
 FILE = Path(__file__).parents[2] / "examples" / "servo_arm.xml"
 
@@ -58,7 +59,7 @@ def test_urdf_is_loaded_by_its_link(tmp_path):
 def test_file_that_mujoco_cannot_read_is_refused_by_name(tmp_path):
     broken = tmp_path / "broken.xml"
     broken.write_text("<mujoco><worldbody><geom/></mujoco>", encoding="utf-8")
-    with pytest.raises(InvalidInputError, match=r"MuJoCo cannot read .*broken\.xml: .*; mend the file"):
+    with pytest.raises(InvalidInputError, match=r"MuJoCo cannot read '.*broken\.xml': .*; mend the file"):
         load_model(str(broken))
 
 

@@ -15,7 +15,8 @@ from contactsafe.results.metrics import ZERO, Aim, Metric
 from contactsafe.results.recording import Portrait, Stage, level_rectangle
 from contactsafe.robot.arm import description_and_tool
 from contactsafe.robot.shape import arm_capsules
-from contactsafe.sim.model_scenes import SPHERE_M, ModelArm, load_model
+from contactsafe.sim.model_arms import ModelArm, load_model
+from contactsafe.sim.model_scenes import SPHERE_M
 
 NAME = "robots"
 QUESTION = (

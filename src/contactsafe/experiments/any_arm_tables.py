@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from contactsafe.experiments.robot_trials import HOLD_S, MOVE_S, PUSH_S, SETTLE_S, SPRING_N_M
 from contactsafe.results.experiment import Table, Trial
 from contactsafe.results.metrics import BASELINE
-from contactsafe.sim.model_scenes import MOVES_M, SPHERE_M, ModelArm
+from contactsafe.sim.model_arms import MOVES_M, ModelArm
+from contactsafe.sim.model_scenes import SPHERE_M
 
 FURTHER_MM, FURTHER = 2.0, 1.2
 LARGER_N, LARGER = 5.0, 1.05
@@ -16,10 +17,9 @@ NOTE = (
     f"Hold: {HOLD_S:g} s. Move: {1000 * MOVES_M:g} mm in {MOVE_S:g} s along an axis of the world, {SETTLE_S:g} s "
     f"later. Push: 25 N for {PUSH_S:g} s on the middle of the arm, or a tenth of what it can hold. Sphere: of "
     f"{SPHERE_M:g} m in the path of the arm's outer half, fixed or on springs of {SPRING_N_M:g} N/m; peak / steady. "
-    "With a wrench the "
-    "controller is told that nothing touches the tool. '-': the joints do not allow it, or nothing of the arm meets "
-    f"anything. Further: by {FURTHER_MM:g} mm and {100 * (FURTHER - 1):.0f} %; larger force: by {LARGER_N:g} N and "
-    f"{100 * (LARGER - 1):.0f} %."
+    "With a wrench the controller is told that nothing touches the tool. '-': the joints do not allow it, or nothing "
+    f"of the arm meets anything. Further: by {FURTHER_MM:g} mm and {100 * (FURTHER - 1):.0f} %; larger force: by "
+    f"{LARGER_N:g} N and {100 * (LARGER - 1):.0f} %."
 )
 
 

@@ -9,7 +9,8 @@ from contactsafe.control.config import ControllerConfig
 from contactsafe.control.controller import Controller
 from contactsafe.control.signals import Measurement, Target
 from contactsafe.robot.arm import Pose
-from contactsafe.sim.model_scenes import ModelArm, Scene, build_scene, pushed_at, sphere_in_path
+from contactsafe.sim.model_arms import ModelArm, pushed_at
+from contactsafe.sim.model_scenes import Scene, build_scene, sphere_in_path
 
 STIFFNESS = np.array([150.0] * 3 + [450.0] * 3)
 HOLD_S, MOVE_S, SETTLE_S, PUSHED_S, PUSH_S = 3.0, 2.0, 1.0, 0.5, 1.5

@@ -1,5 +1,6 @@
 """Parts of a MuJoCo scene that is still to be compiled: a site at a flange, a motor, what is taken off."""
 
+import os
 from typing import Any, NamedTuple
 
 import mujoco
@@ -25,6 +26,19 @@ class Flange(NamedTuple):
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     name: str = "flange"
+
+
+def read_spec(path: str | os.PathLike) -> mujoco.MjSpec:
+    """Read an MJCF file as a scene to be edited.
+
+    Raises:
+        InvalidInputError: MuJoCo cannot.
+    """
+    try:
+        return mujoco.MjSpec.from_file(os.fspath(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InvalidInputError(f"MuJoCo cannot read '{os.fspath(path)}': {reason}; mend the file") from None
 
 
 def compiled_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
@@ -93,3 +107,8 @@ def remove(spec: mujoco.MjSpec, thing: Any) -> None:
         thing.delete()
     else:
         spec.delete(thing)
+
+
+def linear(like: float | np.ndarray, value: float) -> float | list[float]:
+    """Return a linear coefficient as an `MjSpec` has it: newer versions have those of higher orders behind it."""
+    return value if np.ndim(like) == 0 else [value, *(np.size(like) - 1) * (0.0,)]

@@ -94,7 +94,13 @@ def checked_home(home: ArrayLike | None, q_min: np.ndarray, q_max: np.ndarray, f
     return given
 
 
-def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel, limits: np.ndarray) -> np.ndarray:
+def usual_home(
+    model: mujoco.MjModel,
+    chain: list[int],
+    nominal: mujoco.MjModel,
+    joint_range: tuple[np.ndarray, np.ndarray],
+    limits: np.ndarray,
+) -> np.ndarray:
     """Choose a home where nobody gave one, (n,), rad: a posture from which the arm can work.
 
     It is the middle of the range where the tool can be moved to all sides there and the motors carry the arm; else the
@@ -104,21 +110,19 @@ def usual_home(model: mujoco.MjModel, chain: list[int], nominal: mujoco.MjModel,
         model: of the scene.
         chain: the arm's joints.
         nominal: model of the arm alone.
+        joint_range: lowest and highest positions, (n,) each, rad.
         limits: of torque, (n,), N m.
     """
-    limited = model.jnt_limited[chain].astype(bool)
-    low, high = (np.where(limited, model.jnt_range[chain, end], (-np.pi, np.pi)[end]) for end in (0, 1))
-    middle, n = 0.5 * (low + high), len(chain)
-    if not np.isfinite(high - low).all():
-        return middle  # the arm is refused for that
+    low, high = finite_range(*joint_range)
+    middle, inner = 0.5 * (low + high), _INNER * (high - low)
     rng = np.random.default_rng(0)
-    postures = np.vstack([middle, rng.uniform(low + _INNER * (high - low), high - _INNER * (high - low), (_TRIED, n))])
+    postures = np.vstack([middle, rng.uniform(low + inner, high - inner, (_TRIED, len(chain)))])
     data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
     for i, q in enumerate(postures):
         readiness[i] = _readiness(nominal, data, q, limits)
-    if readiness[0] >= _READY * readiness.max():
-        return middle
     ready = _READY * readiness.max()
+    if readiness[0] >= ready:
+        return middle
     between = [middle + part * (q - middle) for q in postures[readiness >= ready] for part in _PARTS]
     distance = [float(np.linalg.norm((q - middle) / (high - low))) for q in between]
     scene = mujoco.MjData(model)

@@ -23,7 +23,7 @@ from contactsafe.robot.description import Inertia, Joint, Tip
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.missing_meshes import find_meshes
 from contactsafe.robot.names import JOINT, SITE, find
-from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec
+from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, read_spec
 from contactsafe.robot.surface import geom_surface
 from contactsafe.robot.torque_driven import torque_driven_copy
 from contactsafe.robot.user_chain import choose_chain, refuse_tied, refuse_weightless
@@ -156,7 +156,7 @@ def _arm(found: Found, options: ArmOptions, findings: Findings) -> Arm:
     found = found._replace(data=data)
     nominal = _nominal_model(model, data, chain, found.site, limits)
     if given is None:
-        home = usual_home(model, chain, nominal, limits)
+        home = usual_home(model, chain, nominal, (q_min, q_max), limits)
     friction, drag, unknown = _friction(found, limits, nominal, options.get("friction"), findings)
     if np.linalg.norm(nominal.opt.gravity) < _GRAVITY_MAX:  # or the arm is refused for that
         meant = key >= 0 or asked is not None
@@ -228,11 +228,7 @@ def _spec(scene: object) -> tuple[mujoco.MjSpec, str]:
     path = os.fspath(scene)
     if path.lower().endswith(".urdf"):
         raise InvalidInputError(f"'{path}' is a URDF; give it to robots.from_urdf")
-    try:
-        return mujoco.MjSpec.from_file(path), f"'{path}'"
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InvalidInputError(f"MuJoCo cannot read '{path}': {reason}; mend the file") from None
+    return read_spec(path), f"'{path}'"
 
 
 def _nominal_model(
