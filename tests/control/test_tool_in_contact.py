@@ -45,7 +45,7 @@ def lands(arm, config, body, force, pushed=(200, 1700), at=600, ticks=3200):
     ],
 )
 def test_board_that_meets_the_tool_under_a_push_is_pressed_as_without_it(panda, body, force):
-    """Taken for a part of the push it was pressed with 60 N and more, and on after the push had ended."""
+    """Taken for a part of the push it was pressed the more the more it answered, and on after the push had ended."""
     pressed, away, out = lands(panda, SAFE, body, np.array(force))
     alone, _, _ = lands(panda, SAFE, body, np.zeros(3))
     baseline, far, _ = lands(panda, VICES, body, np.array(force))

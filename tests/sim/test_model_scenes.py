@@ -1,8 +1,8 @@
 """Models of files in a scene: found, locked but for the arm, with a sphere that is fixed or on springs."""
 
+import re
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -75,6 +75,17 @@ def test_joints_that_are_not_the_arms_stay_where_they_are(tmp_path):
     assert np.abs(scene.q - of.arm.home).max() > 0.1  # the arm does fall
 
 
+def test_other_joints_begin_where_the_arms_model_has_them(tmp_path):
+    """The key frame of home lifts the arm; its scene began with the lift down, and the tool elsewhere."""
+    lift = '<body name="pedestal" pos="0 0 0.4"><joint name="cart" type="slide" axis="0 0 1"/>'
+    of = load_model(
+        with_parts(tmp_path, ('<body name="pedestal" pos="0 0 0.4">', lift), ('qpos="0 -0.2', 'qpos="0.2 0 -0.2'))
+    )
+    scene = build_scene(of)
+    assert scene.data.joint("cart").qpos[0] == pytest.approx(0.2)
+    np.testing.assert_allclose(scene.tool, of.arm.tool_pose(of.arm.home).position, atol=1e-9)
+
+
 def test_scene_begins_at_home_at_rest(of):
     scene = build_scene(of)
     np.testing.assert_array_equal(scene.q, of.arm.home)
@@ -93,12 +104,10 @@ def test_sphere_gives_way_only_on_springs(of, stiffness, moves):
 
 def test_file_whose_joints_are_limited_by_default_takes_a_sphere_on_springs(tmp_path):
     """The sphere's joints are the file's default as well, and had no range."""
-    spec = mujoco.MjSpec.from_file(str(FILE))
-    spec.default.joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-    path = tmp_path / "limited.xml"
-    spec.compile()
-    path.write_text(spec.to_xml(), encoding="utf-8")
-    scene = build_scene(load_model(str(path)), np.array([2.0, 2.0, 2.0]), 1000.0)
+    path = with_parts(tmp_path, ('<joint axis="0 1 0" range="-6.28 6.28"', '<joint axis="0 1 0" limited="true"'))
+    text = Path(path).read_text(encoding="utf-8")
+    Path(path).write_text(re.sub(r'(<joint name="\w+")(?! range)', r'\1 range="-3 3"', text), encoding="utf-8")
+    scene = build_scene(load_model(path), np.array([2.0, 2.0, 2.0]), 1000.0)
     scene.step(np.zeros(6))
     assert np.isfinite(scene.q).all()
 

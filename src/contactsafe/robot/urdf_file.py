@@ -142,5 +142,5 @@ def _give_motors(spec: mujoco.MjSpec, root: ET.Element) -> None:
             motor = spec.add_actuator(name=_MOTOR.format(name), target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             become_motor(motor, effort if effort > 0.0 else np.inf)
     for body in spec.bodies[1:]:
-        if body.parent is not None:  # the root link's is the world itself
+        if body.parent is not None and body.parent.name != "world":
             spec.add_exclude(bodyname1=body.parent.name, bodyname2=body.name)
