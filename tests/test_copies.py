@@ -30,6 +30,7 @@ from contactsafe.policy.bundle import Bundle, shipped_bundle
 from contactsafe.policy.perception import Perception
 from contactsafe.policy.policy import Policy
 from contactsafe.robot.dynamics import forward_kinematics
+from contactsafe.robot.findings import Findings
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.sim.config import REAL_SENSORS
 from contactsafe.sim.worlds import Worlds
@@ -204,6 +205,13 @@ def compute(threads):
     return [threads.submit(np.square, k).result() for k in range(4)]
 
 
+def find(findings):
+    findings.problem(f"no joint {len(findings._problems)}")
+    with pytest.raises(InvalidInputError) as caught:
+        findings.raise_problems()
+    return [np.frombuffer(str(caught.value).encode(), np.uint8)]
+
+
 # How each is made, in the midst of what it does.
 
 
@@ -363,6 +371,7 @@ ACTORS = {
     "InsertionEpisodes": (begun(lambda: Insertion().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
     "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
+    "Findings": (begun(Findings, find), find),
     "Plotter": (plotter, lambda p: [p._count]),
 }
 """How each is made in the midst of what it does, and what it does next, as arrays."""

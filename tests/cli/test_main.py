@@ -124,7 +124,7 @@ def test_options_that_do_not_exist_exit_2(words, capsys):
         (
             "experiment dancing",
             "'dancing' is unknown; choose from task-safety, joint-safety, disturbance, collisions, detection, "
-            "pushes, localisation, adversarial, clock; see contactsafe experiment --help",
+            "pushes, localisation, adversarial, clock, robots; see contactsafe experiment --help",
         ),
         ("experiment disturbance --controllers safe,best", UNKNOWN.format("controllers", "experiment")),
         ("demo --controllers best", UNKNOWN.format("controllers", "demo")),

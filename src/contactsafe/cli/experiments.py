@@ -30,6 +30,9 @@ from contactsafe.tasks import DEFAULT_TASK, task_by_name
 from contactsafe.tasks.base.registry import place_of
 
 
+_MODELS = tyro.conf.arg(metavar="PATH[:TOOL]...", help_behavior_hint="(of robots alone)")
+
+
 def _usual_trials() -> str:
     by_number: dict[int, list[str]] = {}
     for name, entry in registry.ENTRIES.items():
@@ -98,7 +101,7 @@ class Options:
     plants: Annotated[tuple[str, ...], some_of(PLANTS)] = PLANTS
     sensors: Annotated[str, one_of(SENSORS)] = ExperimentConfig.sensors
     minutes: float = ExperimentConfig.minutes
-    models: tuple[str, ...] = ()
+    models: Annotated[tuple[str, ...], _MODELS] = ()
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: none is written)")] = None
     json: bool = False
     bundle: BundleFolder = None
@@ -111,7 +114,7 @@ def experiment(arguments: Sequence[str]) -> None:
 
       EXPERIMENTS
 
-    The first two run a policy, the first three a task; the others drive a Panda by scripts. A trial depends on its own
+    The first two run a policy, the first three a task; the others drive an arm by scripts. A trial depends on its own
     seed alone: `--seed 17 --trials 1 --out DIR` runs trial 17 of any batch once more and draws it.
     """
     from contactsafe.report import prepare_output, terminal_table, write_report

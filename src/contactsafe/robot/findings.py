@@ -4,10 +4,11 @@ import contextlib
 import warnings
 from collections.abc import Iterator
 
+from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError, ModelWarning
 
 
-class Findings:
+class Findings(Independent):
     """What was found in a model: problems, which are its end, and notes, which its user should know."""
 
     def __init__(self) -> None:

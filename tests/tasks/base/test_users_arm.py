@@ -224,16 +224,20 @@ BASE = 'name="column" pos="-0.1 0 0.05">'
 FAR_FROM = "task '{}' needs the tool at {} m, pointing down, where arm 'palletiser' does not reach; change {}"
 FAR_FROM_BOARD = FAR_FROM.format("wiping", "[0.400, -0.100, 0.040]", "board.centre of WipingConfig")
 FAR_FROM_MOUTH = FAR_FROM.format("insertion", "[0.495, -0.005, 0.065]", "mouth of InsertionConfig")
+HINGES = (
+    "the arm's are hinges: give joints=[...] without it, to lock it; those that fit are "
+    "joints=['turn', 'shoulder', 'elbow', 'pitch', 'roll', 'yaw']"
+)
 NO_ARM = {
     "a description": ("wiping", lambda: PANDA, "arm is ArmDescription; give an Arm such as contactsafe.robots.panda()"),
     "a name": ("wiping", lambda: "panda", "arm is str; give an Arm such as contactsafe.robots.panda()"),
     "a mobile base": (
         "wiping", lambda: scene_of(ROBOT.replace(BASE, BASE + "<freejoint name='float'/>")),
-        "joint 'float' is of type free; the arm's are hinges: give joints=[...] without it, to lock it",
+        "joint 'float' is of type free; " + HINGES,
     ),
     "a base on a rail": (
         "wiping", lambda: scene_of(ROBOT.replace(BASE, BASE + "<joint name='rail' type='slide'/>")),
-        "joint 'rail' is of type slide; the arm's are hinges: give joints=[...] without it, to lock it",
+        "joint 'rail' is of type slide; " + HINGES,
     ),
     "three joints": (
         "wiping", lambda: scene_of(ROBOT, joints=["turn", "shoulder", "elbow"]),
