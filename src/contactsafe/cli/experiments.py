@@ -29,7 +29,6 @@ from contactsafe.sim.config import SENSORS
 from contactsafe.tasks import DEFAULT_TASK, task_by_name
 from contactsafe.tasks.base.registry import place_of
 
-
 _MODELS = tyro.conf.arg(metavar="PATH[:TOOL]...", help_behavior_hint="(of robots alone)")
 
 
