@@ -1,4 +1,4 @@
-"""Whether the controller commands the same torques on another version of MuJoCo.
+"""Whether the controller commands the same torques on another version of MuJoCo, and on the lowest NumPy.
 
     python benchmarks/other_mujoco.py 3.3.0 3.9.0     installs each version beside this one, once, and compares
     python benchmarks/other_mujoco.py --have          compares with those that are there, without the network
@@ -19,6 +19,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "mujoco"
 TICKS = 400
+LOWEST_NUMPY = "1.26.4"  # which robosuite's mink pins
 ALLOWED_NM = 1e-6  # principal axes of inertia are found to 1e-8 by the compiler of MuJoCo 3
 
 
@@ -28,11 +29,11 @@ def installed() -> list[Path]:
 
 
 def install(version: str) -> Path:
-    """Put a version into a folder of its own, beside the one of this environment."""
+    """Put a version and the lowest NumPy into a folder of its own, beside those of this environment."""
     folder = FOLDER / version
     if not (folder / "mujoco").is_dir():
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder)]
-        subprocess.run([*pip, f"mujoco=={version}"], check=True)
+        subprocess.run([*pip, f"mujoco=={version}", f"numpy=={LOWEST_NUMPY}"], check=True)
     return folder
 
 

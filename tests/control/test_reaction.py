@@ -14,7 +14,7 @@ from contactsafe.control.codes import COMPLY, NO_CONTACT, OBSTACLE, PUSH, REJECT
 from contactsafe.control.contact_bound import contact_limit, reject_limit
 from contactsafe.control.isolation import isolation_dtype
 from contactsafe.control.params import fill_params, params_dtype
-from contactsafe.control.reaction import begin_reaction, damp_approach, react, reaction_dtype
+from contactsafe.control.reaction import begin_reaction, damp_approach, damp_contact, react, reaction_dtype
 
 seeds = st.integers(0, 2**32 - 1)
 limits = st.floats(0.1, 50.0)
@@ -37,7 +37,7 @@ def begun():
 def test_damping_of_the_approach_takes_energy_out_and_leaves_what_recedes(seed, damping):
     M, _, direction, qd = scene(seed)
     tau = np.zeros(7)
-    damp_approach(tau, direction, qd, M, np.zeros(7), 300.0, damping)
+    damp_approach(tau, direction, qd, True, M, np.zeros(7), 300.0, damping)
     if direction @ qd >= 0.0:
         assert_array_equal(tau, 0.0)
     else:
@@ -87,3 +87,28 @@ def test_bound_of_an_obstacle_falls_from_the_initial_one_to_that_of_comply(param
 
 def test_a_contact_begins_without_a_bound_of_an_earlier_one():
     assert begun()["initial_limit_n"] == math.inf
+
+
+@given(seeds)
+def test_arm_drifted_half_a_metre_after_what_it_touched_had_gone(seed):
+    """While the contact is not yet over the task is let go: motion to either side is braked."""
+    M, _, direction, qd = scene(seed)
+    tau = np.zeros(7)
+    damp_approach(tau, direction, qd, False, M, np.zeros(7), 300.0, 50.0)
+    assert tau @ qd < 0.0
+
+
+@given(seeds, st.sampled_from([COMPLY, REJECT]))
+def test_damping_made_a_tool_late_that_moves_while_its_arm_is_pushed(params, seed, mode):
+    """Against a push it takes energy out of the null space alone, the task is not accelerated; else of all joints."""
+    _, M_inv, _, qd = scene(seed)
+    J = np.random.default_rng(seed).normal(size=(6, 7))
+    J_bar = M_inv @ J.T @ np.linalg.inv(J @ M_inv @ J.T)
+    N_t = np.eye(7) - J_bar @ J
+    damping = np.zeros(7)
+    damp_contact(damping, mode, N_t, np.zeros((7, 7)), qd, np.ones(7), params)
+    resisted = np.linalg.norm(J @ M_inv @ damping) > 1e-9 * np.linalg.norm(damping)
+    assert resisted == (mode == COMPLY)
+    in_null, damping = N_t @ qd, np.zeros(7)
+    damp_contact(damping, mode, N_t, np.zeros((7, 7)), in_null, np.ones(7), params)
+    assert in_null @ damping < 0.0

@@ -20,8 +20,11 @@ _f = np.float64
 _LEAST_J = 0.0005
 """The least that anything is thought to have taken."""
 
-_STANDS_OUT_NM, _LOST = 0.4, 0.25
-"""A change of the torque that noise does not show; and the part of it that must be lost before a push is none."""
+STANDS_OUT_NM = 0.4
+"""Torque that noise does not show."""
+
+_LOST = 0.5
+"""Part of its torque that a push must lose before it is none."""
 
 _CERTAIN = 4.0
 """A push once classified is one until so many times the probing displacement speaks for an obstacle."""
@@ -159,7 +162,7 @@ def is_stiff(change: float, displacement: float, softest: float, doubt_nm: float
         softest: thing that counts as an obstacle, k l², N m/rad; half of that draws the line.
         doubt_nm: by which the model's errors may have changed the torque, N m.
     """
-    return change > max(0.5 * softest * displacement, _STANDS_OUT_NM + doubt_nm)
+    return change > max(0.5 * softest * displacement, STANDS_OUT_NM + doubt_nm)
 
 
 @compiled
@@ -167,8 +170,8 @@ def goes_on(drop: float, displacement: float, torque: float, taken_j: float, sof
     """Tell a push on the arm from an obstacle in its path, by what receding from it brings.
 
     A spring that took A joules to come to a torque of τ loses τ² / (2 A) for every radian that the arm recedes; a push
-    goes on. So does what is softer than anything that counts as an obstacle. Half of that draws the line, and it must
-    stand out.
+    goes on. So does what is softer than anything that counts as an obstacle. Three quarters of that draw the line, and
+    it must stand out.
 
     Args:
         drop: by which the contact's torque has fallen, N m.
@@ -180,7 +183,7 @@ def goes_on(drop: float, displacement: float, torque: float, taken_j: float, sof
     """
     stiffness = max(0.5 * torque * torque / max(taken_j, _LEAST_J), 0.5 * softest)
     expected = min(stiffness * displacement, torque)
-    return drop < 0.5 * expected - _STANDS_OUT_NM - doubt_nm
+    return drop < 0.75 * expected - STANDS_OUT_NM - doubt_nm
 
 
 @compiled

@@ -141,7 +141,7 @@ class ReactionConfig(Stage):
         20.0, "N", "the bound when a contact begins; it falls exponentially, and from "
         "`contact_force_limit_comply_n` on that one is in force",
     )  # fmt: skip
-    contact_force_limit_decay_s: float = parameter(0.15, "s", "time constant with which it falls", positive=True)
+    contact_force_limit_decay_s: float = parameter(0.05, "s", "time constant with which it falls", positive=True)
     tool_force_limit_n: float = parameter(
         _INF,
         "N",

@@ -70,14 +70,16 @@ def set_thresholds(
 
 
 @inlined
-def detect(detection: Record, in_contact: bool, ticks: int, params: Record) -> tuple[int, bool]:
+def detect(detection: Record, in_contact: bool, presses: bool, ticks: int, params: Record) -> tuple[int, bool]:
     """Return the furthest link whose joint exceeds its threshold, and whether the arm is in contact from now on.
 
-    Contact begins above the threshold; it ends after the dwell, once all joints have stayed below a fraction of it.
+    Contact begins above the threshold; it ends after the dwell, once all joints have stayed below a fraction of it, or
+    below all of it where nothing presses any more: what is left then is the model's, and who yields to it drifts away.
 
     Args:
         detection: `detection_dtype` record; its times are advanced.
         in_contact: whether the arm was in contact.
+        presses: whether the torque along the contact's direction stands out.
         ticks: that passed.
         params: of detection.
 
@@ -85,7 +87,7 @@ def detect(detection: Record, in_contact: bool, ticks: int, params: Record) -> t
         Link, 1 … n, 0 for none; and whether in contact.
     """
     link = _furthest_above(detection.residual, detection.threshold, 1.0)
-    kept = _furthest_above(detection.residual, detection.threshold, params.release_fraction) if in_contact else link
+    kept = _furthest_above(detection.residual, detection.threshold, params.release_fraction) if presses else link
     detection.contact_ticks += ticks
     detection.quiet_ticks = 0 if kept != 0 else detection.quiet_ticks + ticks
     if not in_contact:

@@ -86,42 +86,58 @@ def compensate_disturbance(J: Matrix, J_bar: Matrix, arm_torque: Vector, out: Ve
 
 @inlined
 def damp_approach(
-    tau: Vector, direction: Vector, qd: Vector, M: Matrix, joint_damping: Vector, rate: float, damping: float
+    tau: Vector,
+    direction: Vector,
+    qd: Vector,
+    presses: bool,
+    M: Matrix,
+    joint_damping: Vector,
+    rate: float,
+    damping: float,
 ) -> None:
     """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
+
+    Where nothing presses any more motion away from it is braked too: an arm that has let its task go would drift on.
 
     Args:
         tau: command less c and g, (n,), N m; updated.
         direction: a, of the contact's torque on the arm, (n,).
         qd: (n,), rad/s.
+        presses: whether the contact's torque stands out.
         M: joint inertia, (n, n), kg m².
         joint_damping: that acts already, (n,), N m s/rad.
         rate: largest damping per inertia of all of it, 1/s.
         damping: d, N m s/rad.
     """
-    approach = min(dot(direction, qd), 0.0)
-    if approach < 0.0 and damping > 0.0:
+    speed = dot(direction, qd)
+    if damping > 0.0 and (speed < 0.0 or not presses):
         d = min(damping, braking_limit(direction, M, joint_damping, rate))
         for i in range(tau.shape[0]):
-            tau[i] -= d * approach * direction[i]
+            tau[i] -= d * speed * direction[i]
 
 
 @inlined
-def damp_contact(damping: Vector, N_removed: Matrix, qd: Vector, scale: Vector, params: Record) -> None:
+def damp_contact(
+    damping: Vector, mode: int, N_t: Matrix, N_ct: Matrix, qd: Vector, scale: Vector, params: Record
+) -> None:
     """Add damping in the null-space direction that the contact takes out, and in all joints, in place.
+
+    In mode REJECT the task goes on: what damps the joints is kept out of it, or a tool that moves would be late.
 
     Args:
         damping: (n,), N m; updated.
-        N_removed: N_t − N_ct, (n, n).
+        mode: COMPLY or REJECT.
+        N_t, N_ct: null-space projectors of the task, and of task and contact, (n, n).
         qd: (n,), rad/s.
         scale: of each joint's damping, (n,).
         params: of reaction.
     """
     n = qd.shape[0]
-    scaled, in_null = stack_vector(n), stack_vector(n)
+    scaled, in_null, beside_contact = stack_vector(n), stack_vector(n), stack_vector(n)
     for i in range(n):
         scaled[i] = scale[i] * qd[i]
-    matvec_t_into(N_removed, scaled, in_null)
+    matvec_t_into(N_t, scaled, in_null)
+    matvec_t_into(N_ct, scaled, beside_contact)
     for i in range(n):
-        damping[i] -= params.null_damping * in_null[i]
-        damping[i] -= params.contact_damping * scale[i] * qd[i]
+        damping[i] -= params.null_damping * (in_null[i] - beside_contact[i])
+        damping[i] -= params.contact_damping * (in_null[i] if mode == REJECT else scaled[i])

@@ -1,6 +1,6 @@
 """From detection to the mode: what each stage says of a contact, in order."""
 
-from contactsafe.control.classification import begin_classification, classify, follow_velocity
+from contactsafe.control.classification import STANDS_OUT_NM, begin_classification, classify, follow_velocity
 from contactsafe.control.codes import COMPLY, FREE, OBSTACLE
 from contactsafe.control.contact_bound import reject_limit
 from contactsafe.control.contact_work import follow_work, stored_at_most, take_for_passive
@@ -20,7 +20,8 @@ def supervise(c: Record) -> None:
     """
     state, params, torque = c.state, c.params, c.state.tool_wrench.arm_torque_fast
     ticks = max(round(state.step.ticks), 1)
-    link, touched = detect(state.detection, state.mode != FREE, ticks, params.detection)
+    in_contact, presses = state.mode != FREE, state.classification.torque_smooth_nm > STANDS_OUT_NM
+    link, touched = detect(state.detection, in_contact, presses, ticks, params.detection)
     if state.mode != FREE and not touched:
         switch(state, FREE)
     elif state.mode == FREE and touched and params.reaction.contact_aware != 0:

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from contactsafe.control import contact_bound, reaction
+from contactsafe.control.classification import STANDS_OUT_NM
 from contactsafe.control.clock import set_step
 from contactsafe.control.codes import (
     BAD_MEASUREMENT,
@@ -138,19 +139,26 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
         contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)
         return state.reaction.task_scale * elastic + damping - state.link_masses.gravity_correction
     compensation = reaction.compensate_disturbance(dynamics.J, J_bar, tool.arm_torque, stack_vector(n))
-    return _contact_law(c, elastic, damping, compensation, N_t - N_ct, scale, reason)
+    return _contact_law(c, elastic, damping, compensation, N_t, N_ct, scale, reason)
 
 
 @inlined
 def _contact_law(
-    c: Record, elastic: Vector, damping: Vector, compensation: Vector, N_removed: Matrix, scale: float, reason: int
+    c: Record,
+    elastic: Vector,
+    damping: Vector,
+    compensation: Vector,
+    N_t: Matrix,
+    N_ct: Matrix,
+    scale: float,
+    reason: int,
 ) -> Vector:
     """Bound the commanded contact force: compensation, on an obstacle the task, last the rest; then damp the approach.
 
     Args:
         c: `controller_dtype` record.
         elastic, damping, compensation: torques of the impedance and of (18), (n,), N m; the latter two are changed.
-        N_removed: null-space direction that the contact takes out, (n, n).
+        N_t, N_ct: null-space projectors of the task, and of task and contact, (n, n).
         scale, reason: task scale that the tool allows.
 
     Returns:
@@ -159,7 +167,7 @@ def _contact_law(
     state, params, impedance = c.state, c.params.reaction, c.state.impedance
     qd, direction, M_inv = state.arm.qd, state.isolation.direction, c.dynamics.M_inv
     limit = contact_bound.contact_limit(state.reaction, state.isolation, params)
-    reaction.damp_contact(damping, N_removed, qd, impedance.damping_scale, params)
+    reaction.damp_contact(damping, state.mode, N_t, N_ct, qd, impedance.damping_scale, params)
     compensated = contact_bound.bound_compensation(compensation, direction, M_inv, limit)
     left = limit - max(min(compensated, limit), 0.0)
     asked = torque_against_contact(direction, M_inv, elastic)
@@ -172,7 +180,10 @@ def _contact_law(
     if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
         rate = c.params.limits.braking_rate - impedance.task_damping
-        reaction.damp_approach(tau, direction, qd, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping)
+        presses = state.classification.torque_smooth_nm > STANDS_OUT_NM
+        reaction.damp_approach(
+            tau, direction, qd, presses, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping
+        )
     return tau
 
 
