@@ -59,15 +59,24 @@ def within_limit(arm: Arm, torque: Any) -> np.ndarray:
     return torque
 
 
-def checked_gain(value: Any, name: str, unit: str, allowed: tuple[float, float]) -> np.ndarray:
-    """Check a gain against its range, (6,)."""
+def checked_stiffness(value: Any, allowed: tuple[float, float]) -> np.ndarray:
+    """Check a stiffness against its range, (6,), 1/s²; 0 lets a direction go."""
+    return _checked_gain(value, "stiffness", "1/s²", allowed, free=True)
+
+
+def checked_damping(value: Any, allowed: tuple[float, float]) -> np.ndarray:
+    """Check a damping against its range, (6,), 1/s."""
+    return _checked_gain(value, "damping", "1/s", allowed, free=False)
+
+
+def _checked_gain(value: Any, name: str, unit: str, allowed: tuple[float, float], free: bool) -> np.ndarray:
     gain = finite_array(value, (6,), name)
     low, high = allowed
-    outside = (gain < low) | (gain > high)
+    outside = ((gain < low) | (gain > high)) & ~(free & (gain == 0.0))
     if outside.any():
         i = int(np.argmax(outside))
         raise InvalidInputError(
-            f"{name}[{i}] = {gain[i]:g} {unit} is outside [{low:g}, {high:g}]; "
+            f"{name}[{i}] = {gain[i]:g} {unit} is outside [{low:g}, {high:g}]{' and not 0' if free else ''}; "
             f"scale it or widen {name}_range of the ControllerConfig"
         )
     return gain

@@ -5,7 +5,8 @@ from numpy.typing import ArrayLike
 
 from contactsafe.control.checks import (
     believable,
-    checked_gain,
+    checked_damping,
+    checked_stiffness,
     in_range,
     numbers_of,
     refuse_overload,
@@ -13,14 +14,18 @@ from contactsafe.control.checks import (
 )
 from contactsafe.control.config import ControllerConfig
 from contactsafe.control.instance import Instance, checked_config, views
+from contactsafe.control.moving_base import MovingBase
 from contactsafe.control.params import OUTSIDE_RAD, mass_variance
 from contactsafe.control.payload import payload_weight_into
 from contactsafe.control.payload_change import take_up
 from contactsafe.control.signals import Measurement, Output, Target, output_of
 from contactsafe.control.tick import tick_at
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm, unit_quaternion
+from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.ik_few_joints import FEW
 from contactsafe.robot.payload import Payload, carrying, checked_payload
 
 RANGE_TOLERANCE = 0.02
@@ -64,7 +69,7 @@ class Controller(Instance):
         config = checked_config(config)
         _warm_up(arm, config)
         self._ik = InverseKinematics(arm)
-        self._loaded = arm
+        self._loaded, self._base, self._base_tick = arm, MovingBase(), 0
         super().__init__(arm, config, records, index)
         self._last_numbers: list = []
 
@@ -98,20 +103,20 @@ class Controller(Instance):
         q = in_range(self.arm, self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
         qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
         qd = believable(qd, self.record["params"]["arm"]["qd_most"])
-        dynamics = self._loaded.dynamics(q, qd)
+        dynamics = self._dynamics(q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else within_limit(self.arm, torque)
         allowed = self.config.impedance.stiffness_range
         held_by = np.clip(np.full(6, _HELD_STIFFNESS), *allowed)
         if stiffness is not None:
-            held_by = checked_gain(stiffness, "stiffness", "1/s²", allowed)
+            held_by = checked_stiffness(stiffness, allowed)
         self.forget()
         self.record["dynamics"] = dynamics
         state = self.record["state"]
         state["command"]["tau"], state["clock"]["q_good"] = tau, q
         self.record["measurement"]["q"], self.record["measurement"]["qd"] = q, qd
-        pose = self.arm.tool_pose(q)
         held = state["target"]
-        held["position"], held["quat"], held["q_posture"] = pose.position, pose.quat, q
+        held["position"], held["quat"] = dynamics["position"], matrix_to_quat(dynamics["rotation"])
+        held["q_posture"] = q
         held["K_task"] = held_by
         held["D_task"] = np.clip(2.0 * np.sqrt(held_by), *self.config.impedance.damping_range)
         self.record["target"] = held
@@ -158,13 +163,39 @@ class Controller(Instance):
         gravity, rotation = self.record["handle"]["gravity"], self.record["dynamics"]["rotation"]
         weight = payload_weight_into(self._records["payload"][self._index], rotation, gravity, np.zeros(6))
         self._loaded, self._nominal = loaded, loaded.nominal()
+        self._place()
         known = self.record["payload"]
         known["mass"], known["com"], known["inertia"] = load
         known["in_wrench"] = self._shows(load, gravity) if in_wrench is None else bool(in_wrench)
-        self.record["handle"] = self._nominal.handle
         self.record["params"]["identification"]["mass_variance"] = mass_variance(self.config, loaded)
         if self.record["state"]["started"]:
             take_up(self._ticked, self._index, weight)
+
+    def set_base(self, pose: Pose, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> None:
+        """Say where the arm's base is from now on: on a lift, a gantry or a mobile platform once a tick, or once.
+
+        Targets, wrenches and outputs stay in world axes: a target that holds is held while the base moves under it.
+        Tilting turns gravity with it. What is not told is felt as a contact; the accelerations of a base that turns
+        fast (from about 1 rad/s or 1 rad/s²) are.
+
+        Args:
+            pose: of the body that carries the first joint, world; position (3,) m, unit quaternion w x y z (4,).
+            velocity: of its origin, world axes, (6,), m/s and rad/s; None for a base that stands.
+            acceleration: of its origin, (3,), m/s²; None for that of the velocities told so far, smoothed.
+
+        Raises:
+            InvalidInputError: a wrong shape, a number that is not finite, or a quaternion that is not of unit length.
+        """
+        ticks = self.record["state"]["link_masses"]["ticks"]
+        self._base.tell(pose, velocity, acceleration, self.config.clock.dt * float(ticks - self._base_tick))
+        self._base_tick = int(ticks)
+        self._place()
+        if self._base.is_elsewhere():
+            self._last_numbers = []
+
+    def _place(self) -> None:
+        self._base.place(self._nominal)
+        self.record["handle"] = self._nominal.handle
 
     def _shows(self, load: Payload, gravity: np.ndarray) -> bool:
         measured = self.record["measurement"]
@@ -188,6 +219,11 @@ class Controller(Instance):
         if mass < _LEAST_KG:
             return checked_payload(0.0)
         return Payload(mass, (known.mass * known.com + found["load"][1:]) / mass, np.zeros((3, 3)))
+
+    def _dynamics(self, q: np.ndarray, qd: np.ndarray) -> np.void:
+        out = np.zeros(1, dtype=dynamics_dtype(self.arm.n))
+        update_dynamics(self._nominal.handle, q, qd, out[0])
+        return out[0]
 
     def _last_torque(self, q: np.ndarray, dynamics: np.void) -> np.ndarray:
         """Return the torque that the arm is under, as far as this controller can know, (n,), N m."""
@@ -216,6 +252,12 @@ class Controller(Instance):
         tick_at(self._ticked, self._index)
         return output_of(self._reported)
 
+    def set_measurement(self, measurement: Measurement) -> None:
+        """Check a measurement and write it into the record; no wrench under a base that was moved."""
+        if self._base.is_told and measurement.wrench_base is not None:
+            raise InvalidInputError("wrench_base is known for a base that stands where the model has it; give None")
+        super().set_measurement(measurement)
+
     def set_target(self, target: Target) -> None:
         """Check a target and make it the one in force; on error the last one stays."""
         if not isinstance(target, Target):
@@ -228,13 +270,17 @@ class Controller(Instance):
         record = self.record["target"]
         position = finite_array(target.pose.position, (3,), "pose.position")
         quat = unit_quaternion(target.pose.quat, "pose.quat")
-        stiffness = checked_gain(target.stiffness, "stiffness", "1/s²", self.config.impedance.stiffness_range)
-        damping = 2.0 * np.sqrt(stiffness) if target.damping is None else target.damping
-        damping = checked_gain(damping, "damping", "1/s", self.config.impedance.damping_range)
+        gains = self.config.impedance
+        stiffness = checked_stiffness(target.stiffness, gains.stiffness_range)
+        critical = np.maximum(2.0 * np.sqrt(stiffness), gains.damping_range[0])
+        damping = checked_damping(critical if target.damping is None else target.damping, gains.damping_range)
         if target.posture is None:
-            posture = self._ik.posture_near(Pose(position, quat), record["q_posture"].copy())
+            pose = self._base.in_model(Pose(position, quat))
+            posture = self._ik.posture_near(pose, record["q_posture"].copy())
         else:
             posture = in_range(self.arm, self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
+        if self.arm.n < FEW:  # it is asked for no rotation that it cannot have there
+            quat = self._base.in_world(self.arm.tool_pose(posture)).quat
         record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers

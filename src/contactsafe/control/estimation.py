@@ -184,6 +184,7 @@ def report_arm(c: Record) -> None:
     out.position[:] = dynamics.position
     out.rotation[:] = dynamics.rotation
     out.velocity[:] = dynamics.velocity
+    out.velocity += dynamics.carried_velocity
     out.mode, out.fault = state.mode, state.fault
     out.kind = contact_kind(state.mode, state.tool_wrench.force, c.params.classification.tool_contact_n)
 

@@ -40,23 +40,32 @@ def impedance_dtype(n: int) -> np.dtype:
 
 @compiled
 def passive_step(
-    K: Vector, D: Vector, K_wanted: Vector, D_wanted: Vector, dt: float, damping_min: float, limited: bool
+    K: Vector,
+    D: Vector,
+    K_wanted: Vector,
+    D_wanted: Vector,
+    dt: float,
+    stiffness_min: float,
+    damping_min: float,
+    limited: bool,
 ) -> None:
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 
     Unit inertia, stiffness K, damping D ≥ α: K̇ + α Ḋ ≤ 2 α K suffices (Kronander & Billard 2016), each axis by
-    itself. Falling gains are free.
+    itself. Falling gains are free. A direction that was let go, K = 0, starts as from the least stiffness, or it would
+    never come back.
 
     Args:
         K, D: in force, (6,), 1/s² and 1/s; updated.
         K_wanted, D_wanted: (6,).
         dt: tick, s.
+        stiffness_min: least that holds anything, 1/s².
         damping_min: α, least damping that may ever be asked for, 1/s.
         limited: whether to limit at all.
     """
     for i in range(6):
         rise = K_wanted[i] - K[i] + damping_min * (D_wanted[i] - D[i])
-        most = 2.0 * damping_min * K[i] * dt
+        most = 2.0 * damping_min * max(K[i], stiffness_min) * dt
         fraction = most / rise if limited and rise > most else 1.0
         K[i] += fraction * (K_wanted[i] - K[i])
         D[i] += fraction * (D_wanted[i] - D[i])
@@ -66,8 +75,8 @@ def passive_step(
 def follow_gains(impedance: Record, target: Record, dt: float, params: Record) -> None:
     """Move the gains in force towards those of the target."""
     passive_step(
-        impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.damping_range[0],
-        params.passive_gains != 0,
+        impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.stiffness_range[0],
+        params.damping_range[0], params.passive_gains != 0,
     )  # fmt: skip
 
 
@@ -90,7 +99,11 @@ def task_wrenches(
     )
     D_task = task_damping_into(impedance.K_task, impedance.D_task, delay_s, stack_vector(6))
     impedance.task_damping = D_task.max()
-    return F_spring, damping_wrench(Lambda, dynamics.velocity, dynamics.Jdot_qd, D_task)
+    velocity, acceleration = stack_vector(6), stack_vector(6)
+    for i in range(6):
+        velocity[i] = dynamics.velocity[i] + dynamics.carried_velocity[i]
+        acceleration[i] = dynamics.Jdot_qd[i] + dynamics.carried_acceleration[i]
+    return F_spring, damping_wrench(Lambda, velocity, acceleration, D_task)
 
 
 @inlined

@@ -88,7 +88,7 @@ def damping_wrench(Lambda: Matrix, velocity: Vector, Jdot_qd: Vector, D_task: Ve
     Args:
         Lambda: task inertia, (6, 6).
         velocity: of the tool, (6,), m/s and rad/s.
-        Jdot_qd: J̇ q̇, (6,).
+        Jdot_qd: J̇ q̇, and what a moving base adds, (6,).
         D_task: damping per unit task inertia, (6,), 1/s.
     """
     acceleration = stack_vector(6)

@@ -38,9 +38,10 @@ class Target(NamedTuple):
     """What a policy asks for; held until the next.
 
     Attributes:
-        pose: desired tool pose, world.
-        stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m).
-        damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness.
+        pose: desired tool pose, world. Of its orientation an arm of fewer than six joints takes the nearest that it has
+            at the position.
+        stiffness: per unit task inertia, (6,), 1/s² (Λ stands before it, so it is not N/m); 0 lets a direction go.
+        damping: per unit task inertia, (6,), 1/s; None for critical damping 2 √stiffness, and the least where it is 0.
         posture: null-space joint reference, (n,), rad; None for the one that goes with `pose`, whatever path led there
             (`InverseKinematics.posture_near`).
     """

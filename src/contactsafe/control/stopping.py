@@ -54,7 +54,8 @@ def stop_late_target(clock: Record, target: Record, kept: int, arm: Record, dyna
         return
     clock.target_late, coasts = 1, stack_vector(6)
     for i in range(6):
-        coasts[i] = dynamics.velocity[i] * target.D_task[i] / target.K_task[i]
+        held = target.K_task[i] > 0.0  # what was let go has no place to come to
+        coasts[i] = dynamics.velocity[i] * target.D_task[i] / target.K_task[i] if held else 0.0
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
     if dot(error[:3], error[:3]) > dot(coasts[:3], coasts[:3]):
         target.position[:] = dynamics.position

@@ -42,7 +42,10 @@ def target_fault(target: Record, params: Record) -> int:
     if abs(dot(target.quat, target.quat) - 1.0) > 2e-3:
         return BAD_QUATERNION
     for i in range(6):
-        if not _within(target.K_task[i], params.stiffness_range) or not _within(target.D_task[i], params.damping_range):
+        free = target.K_task[i] == 0.0
+        if not (free or _within(target.K_task[i], params.stiffness_range)):
+            return BAD_GAIN
+        if not _within(target.D_task[i], params.damping_range):
             return BAD_GAIN
     return 0
 

@@ -12,8 +12,9 @@ from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat
 from contactsafe.robot.binding import Binding, bind_joints
 from contactsafe.robot.description import ArmDescription, Tool
-from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, make_handle, update_dynamics
+from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, update_dynamics
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
+from contactsafe.robot.nominal import NominalModel
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 from contactsafe.robot.surface import SURFACE_COLUMNS, capsule_surface
 from contactsafe.robot.touchable import capsule_places, touchable
@@ -30,26 +31,6 @@ class Pose(NamedTuple):
 
     position: np.ndarray
     quat: np.ndarray
-
-
-class NominalModel(Independent):
-    """One private copy of an arm's nominal model, to be used from one thread at a time.
-
-    Attributes:
-        handle: `handle_dtype` record for compiled code.
-    """
-
-    _bound = ("_data", "handle")
-
-    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray, places: np.ndarray):
-        self._model = model
-        self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
-        self._places = np.ascontiguousarray(places, dtype=float)
-        self._bind()
-
-    def _bind(self) -> None:
-        self._data = mujoco.MjData(self._model)
-        self.handle = make_handle(self._model, self._data, self._site, self._surface, self._places)[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.core.arrays import Matrix, Record, Vector
-from contactsafe.core.compiled import compiled
+from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import cross_into, dot, matvec_into, spd_inverse
 from contactsafe.core.native import (
     full_inertia,
@@ -44,7 +44,10 @@ handle_dtype = np.dtype(
         ("first_body", np.int64),
         ("tool_body", np.int64),
         ("nbody", np.int64),
-        ("gravity", np.float64, (3,)),
+        ("gravity", np.float64, (3,)),  # less what the base accelerates with
+        ("base_position", np.float64, (3,)),  # of the base, world, m; where it moves
+        ("base_twist", np.float64, (6,)),  # world axes, m/s and rad/s
+        ("base_acceleration", np.float64, (3,)),  # m/s²
     ]
 )
 """Where a compiled function finds one nominal model: addresses of MjModel, MjData and its arrays; body numbers."""
@@ -66,6 +69,8 @@ def dynamics_dtype(n: int) -> np.dtype:
             ("position", f, (3,)),  # tool point, world, m
             ("rotation", f, (3, 3)),  # tool axes, world
             ("velocity", f, (6,)),  # J q̇, m/s and rad/s
+            ("carried_velocity", f, (6,)),  # with which a moving base carries the tool along, m/s and rad/s
+            ("carried_acceleration", f, (6,)),  # likewise, where the base does not turn, m/s² and rad/s²
             ("mass_regressor", f, (n, n + 1)),  # of `mass_regressor`, N m
         ]
     )
@@ -230,6 +235,19 @@ def _jacobian_rate(handle: Record, n: int, out: Vector) -> None:
         out[3 + k] = a[k]
 
 
+@inlined
+def _carry_along(handle: Record, out: Record) -> None:
+    """Fill what a moving base carries the tool along with: v + ω × r, ω; its acceleration, turning left out."""
+    r, swing = stack_vector(3), stack_vector(3)
+    for k in range(3):
+        r[k] = out.position[k] - handle.base_position[k]
+    cross_into(handle.base_twist[3:], r, swing)
+    for k in range(3):
+        out.carried_velocity[k] = handle.base_twist[k] + swing[k]
+        out.carried_velocity[3 + k] = handle.base_twist[3 + k]
+        out.carried_acceleration[k] = handle.base_acceleration[k]
+
+
 @compiled(nogil=True)
 def update_dynamics(handle: Record, q: Vector, qd: Vector, out: Record) -> bool:
     """Fill a `dynamics_dtype` record for joint positions q (n,) rad and velocities qd (n,) rad/s.
@@ -254,4 +272,5 @@ def update_dynamics(handle: Record, q: Vector, qd: Vector, out: Record) -> bool:
     _tool_jacobian(handle, out.J)
     _jacobian_rate(handle, n, out.Jdot_qd)
     matvec_into(out.J, qd, out.velocity)
+    _carry_along(handle, out)
     return spd_inverse(out.M, out.M_inv)

@@ -7,16 +7,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contactsafe.core.arrays import Matrix, Record, Vector
+from contactsafe.core.arrays import Record, Vector
 from contactsafe.core.compiled import compiled
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import UnreachableError
 from contactsafe.core.files import readable
-from contactsafe.core.linalg import dot, matvec, matvec_t, spd_inverse
+from contactsafe.core.linalg import dot
 from contactsafe.core.rotation import orientation_error, quat_to_matrix
 from contactsafe.robot.arm import Arm, Pose, finite_array, finite_range, unit_quaternion
 from contactsafe.robot.dynamics import forward_kinematics
-from contactsafe.robot.posture import POSITION_TOLERANCE, ROTATION_TOLERANCE, find_posture, posture_rule
+from contactsafe.robot.ik_few_joints import FEW, solve_position_first
+from contactsafe.robot.ik_step import limited_step
+from contactsafe.robot.posture import (
+    POSITION_TOLERANCE,
+    ROTATION_TOLERANCE,
+    find_posture,
+    posture_rule,
+    turn_towards,
+)
 from contactsafe.robot.urdf import BASE_LINK, TIP_LINK, arm_urdf
 
 try:
@@ -26,14 +34,13 @@ except ImportError:  # no wheel for this platform: the compiled solver serves al
 
 _SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
-_STEP = 0.5  # largest change of one joint in one iteration, rad: the linearised arm is worth little beyond
-_DAMPING = 1e-6  # keeps the normal matrix invertible in a singularity; too small to be felt elsewhere
-_MARGIN = 0.1  # rad from a joint limit at which a step away from it begins
-_RECOVERY = 0.2  # fraction of the missing margin that one iteration asks to win back
 
 
 class InverseKinematics(Independent):
     """Find joint positions for tool poses, one thread at a time.
+
+    An arm of fewer than six joints cannot serve all of a pose: it reaches the position, and of the orientations that it
+    has there the one nearest.
 
     Args:
         arm: whose limits and kinematics count.
@@ -42,7 +49,7 @@ class InverseKinematics(Independent):
     _bound = ("_reference",)
 
     def __init__(self, arm: Arm):
-        self._arm = arm
+        self._arm, self._few = arm, arm.n < FEW
         self._rule = posture_rule(arm)
         self._nominal = arm.nominal()
         low, high = finite_range(arm.q_min, arm.q_max)
@@ -64,7 +71,8 @@ class InverseKinematics(Independent):
             pose: of the tool, world; position (3,) m, unit quaternion w x y z (4,).
 
         Returns:
-            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and `ROTATION_TOLERANCE`.
+            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and, of six joints and more, within
+            `ROTATION_TOLERANCE`.
 
         Raises:
             InvalidInputError: wrong shape, not finite, or a quaternion that is not of unit length to 1e-3.
@@ -93,7 +101,7 @@ class InverseKinematics(Independent):
             return self.posture(pose)
         except UnreachableError:
             q, error = self._from_seed(*_checked_pose(pose), np.asarray(q_seed, dtype=float))
-            if not _reached(error):
+            if not self._reached(error):
                 raise
             return q
 
@@ -110,7 +118,8 @@ class InverseKinematics(Independent):
             q_seed: where to start, (n,), rad; None for the posture of the pose.
 
         Returns:
-            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and `ROTATION_TOLERANCE`.
+            Joint positions, (n,), rad; the tool is within `POSITION_TOLERANCE` and, of six joints and more, within
+            `ROTATION_TOLERANCE`.
 
         Raises:
             InvalidInputError: wrong shape, not finite, or a quaternion that is not of unit length to 1e-3.
@@ -120,7 +129,7 @@ class InverseKinematics(Independent):
         near = [] if q_seed is None else [self._arm.joint_vector(q_seed, "q_seed")]
         for seed in near:
             q, error = self._from_seed(position, quat, seed)
-            if _reached(error):
+            if self._reached(error):
                 return q
         q, reached = self._posture(position, quat)
         if reached:
@@ -128,18 +137,18 @@ class InverseKinematics(Independent):
         nearest = (math.inf, math.inf)
         for seed in (*near, *self._seeds):
             q, error = self._from_seed(position, quat, seed)
-            if _reached(error):
+            if self._reached(error):
                 return q
             nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + e[1] / ROTATION_TOLERANCE)
-        if self._reference is not None:
+        if not self._few and self._reference is not None:
             found = self._reference.ik(position, quat_to_matrix(quat), (*near, self._arm.home)[0])
             if found is not None:
                 q, error = self._from_seed(position, quat, found)
-                if _reached(error):
+                if self._reached(error):
                     return q
         raise UnreachableError(
             f"pose at {_position_words(position)} was not reached: the nearest found is "
-            f"{_error_words(*nearest)} away, allowed is {_error_words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
+            f"{self._words(*nearest)} away, allowed is {self._words(POSITION_TOLERANCE, ROTATION_TOLERANCE)}; "
             "move it towards the arm, turn it, or give another q_seed"
         )
 
@@ -148,13 +157,33 @@ class InverseKinematics(Independent):
         return trac_ik(self._arm)  # only where the compiled solver fails: building it takes 10 ms
 
     def _posture(self, position, quat) -> tuple[np.ndarray, bool]:
+        if self._few:
+            return self._first_posture(position, quat)
         q = np.empty(self._arm.n)
-        return q, _reached(find_posture(self._rule, position, quat, q))
+        return q, self._reached(find_posture(self._rule, position, quat, q))
+
+    def _first_posture(self, position, quat) -> tuple[np.ndarray, bool]:
+        """Search from home turned towards the position, then from the fixed seeds."""
+        towards = np.array(self._rule.home)
+        turn_towards(self._rule, position, towards)
+        for seed in (towards, *self._seeds):
+            q, error = self._from_seed(position, quat, seed)
+            if self._reached(error):
+                return q, True
+        return self._arm.home.copy(), False
 
     def _from_seed(self, position, quat, seed):
-        q = np.empty(self._arm.n)
-        error = solve_ik(self._nominal.handle, position, quat, seed, self._arm.q_min, self._arm.q_max, q)
+        q, search = np.empty(self._arm.n), solve_position_first if self._few else solve_ik
+        error = search(self._nominal.handle, position, quat, seed, self._arm.q_min, self._arm.q_max, q)
         return q, error
+
+    def _reached(self, error: tuple[float, float]) -> bool:
+        return error[0] <= POSITION_TOLERANCE and (self._few or error[1] <= ROTATION_TOLERANCE)
+
+    def _words(self, position_error_m: float, rotation_error_rad: float) -> str:
+        """Write for a message what of a pose error counts."""
+        position = f"{1e3 * position_error_m:.1f} mm"
+        return position if self._few else f"{position} and {math.degrees(rotation_error_rad):.2f}°"
 
 
 def _position_words(position: np.ndarray) -> str:
@@ -162,17 +191,8 @@ def _position_words(position: np.ndarray) -> str:
     return f"[{', '.join(f'{x:.3f}' for x in position)}] m"
 
 
-def _error_words(position_error_m: float, rotation_error_rad: float) -> str:
-    """Write a pose error for a message."""
-    return f"{1e3 * position_error_m:.1f} mm and {math.degrees(rotation_error_rad):.2f}°"
-
-
 def _checked_pose(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     return finite_array(pose.position, (3,), "pose.position"), unit_quaternion(pose.quat, "pose.quat")
-
-
-def _reached(error: tuple[float, float]) -> bool:
-    return error[0] <= POSITION_TOLERANCE and error[1] <= ROTATION_TOLERANCE
 
 
 def trac_ik(arm: Arm, timeout_s: float = 0.02) -> Any:
@@ -219,8 +239,7 @@ def solve_ik(
     """
     n = q_seed.shape[0]
     found, rotation, J = np.empty(3), np.empty((3, 3)), np.empty((6, n))
-    error, step, free = np.empty(6), np.empty(n), np.empty(n)
-    A, A_inv = np.empty((6, 6)), np.empty((6, 6))
+    error, step = np.empty(6), np.empty(n)
     for i in range(n):
         q_out[i] = min(max(q_seed[i], q_min[i]), q_max[i])
     for iteration in range(_ITERATIONS + 1):
@@ -235,74 +254,7 @@ def solve_ik(
             break
         if iteration == _ITERATIONS or not position_error + rotation_error < math.inf:
             break
-        _limited_step(J, error, q_out, q_min, q_max, step, free, A, A_inv)
+        limited_step(J, error, q_out, q_min, q_max, step)
         for i in range(n):
             q_out[i] = min(max(q_out[i] + step[i], q_min[i]), q_max[i])
     return position_error, rotation_error
-
-
-@compiled
-def _limited_step(
-    J: Matrix,
-    error: Vector,
-    q: Vector,
-    q_min: Vector,
-    q_max: Vector,
-    step: Vector,
-    free: Vector,
-    A: Matrix,
-    A_inv: Matrix,
-) -> None:
-    """Fill the step: joints that it would carry past a limit stop there, and the others make up for them."""
-    n = q.shape[0]
-    for i in range(n):
-        free[i] = 1.0
-        below, above = q_min[i] + _MARGIN - q[i], q[i] - (q_max[i] - _MARGIN)
-        step[i] = _RECOVERY * (max(below, 0.0) - max(above, 0.0))
-    wanted = step.copy()
-    for _ in range(n):
-        _damped_step(J, error, wanted, free, step, A, A_inv)
-        _shorten(step)
-        stopped = False
-        for i in range(n):
-            past = not q_min[i] <= q[i] + step[i] <= q_max[i]
-            if free[i] == 1.0 and past:
-                free[i] = 0.0
-                wanted[i] = min(max(q[i] + step[i], q_min[i]), q_max[i]) - q[i]
-                stopped = True
-        if not stopped:
-            return
-
-
-@compiled
-def _damped_step(
-    J: Matrix, error: Vector, wanted: Vector, free: Vector, step: Vector, A: Matrix, A_inv: Matrix
-) -> None:
-    """Step = wanted + Jᵀ (J Jᵀ + λ 1)⁻¹ (error − J wanted), joints that are not free left as wanted; λ = ½ |error|²."""
-    n = wanted.shape[0]
-    damping = 0.5 * dot(error, error) + _DAMPING
-    for i in range(6):
-        for j in range(i + 1):
-            s = 0.0
-            for k in range(n):
-                s += J[i, k] * free[k] * J[j, k]
-            A[i, j] = s
-            A[j, i] = s
-        A[i, i] += damping
-    spd_inverse(A, A_inv)
-    missing = matvec(J, wanted)
-    for i in range(6):
-        missing[i] = error[i] - missing[i]
-    correction = matvec_t(J, matvec(A_inv, missing))
-    for i in range(n):
-        step[i] = wanted[i] + free[i] * correction[i]
-
-
-@compiled
-def _shorten(step: Vector) -> None:
-    largest = 0.0
-    for i in range(step.shape[0]):
-        largest = max(largest, abs(step[i]))
-    if largest > _STEP:
-        for i in range(step.shape[0]):
-            step[i] *= _STEP / largest

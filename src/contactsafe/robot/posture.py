@@ -126,7 +126,7 @@ def find_posture(rule: PostureRule, position: Vector, quat: Vector, q_out: Vecto
     q_out[:] = rule.home
     if not _may_be_reached(rule, position, quat):
         return math.inf, math.inf
-    _turn_towards(rule, position, q_out)
+    turn_towards(rule, position, q_out)
     position_error, rotation_error, reached = _follow(rule, position, quat, q_out)
     if not reached:
         position_error, rotation_error, reached = _try_others(rule, position, quat, q_out)
@@ -176,7 +176,7 @@ def _may_be_reached(rule: PostureRule, position: Vector, quat: Vector) -> bool:
 
 
 @compiled
-def _turn_towards(rule: PostureRule, position: Vector, q: Vector) -> None:
+def turn_towards(rule: PostureRule, position: Vector, q: Vector) -> None:
     """Turn the first joint by the pose's azimuth less home's, as far as its range goes."""
     axis, away = rule.chain.axes[0], stack_vector(3)
     for a in range(3):

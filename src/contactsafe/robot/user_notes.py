@@ -62,8 +62,8 @@ def note_unserved(
         )
     if len(chain) < 6:
         findings.note(
-            f"{len(chain)} joints cannot serve all six coordinates of a pose: what they do not reach of a target stays "
-            "an error, and a move along a straight line of poses raises UnreachableError"
+            f"{len(chain)} joints cannot serve all six coordinates of a pose: the tool goes to the position of a "
+            "target, and takes the orientation nearest to the one asked for"
         )
     standing = [joint for joint in joints_above(model, model.jnt_bodyid[chain[0]]) if joint not in chain]
     free = [joint for joint in standing if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE]

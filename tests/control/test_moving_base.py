@@ -1,0 +1,127 @@
+"""A base that stands elsewhere than the model has it, or moves: on a lift, a gantry, a mobile platform."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tests.control.plant import STIFFNESS, UNTOUCHED
+from tests.robot.worlds import cell
+
+from contactsafe import Controller, Measurement, Payload, Pose, Target, presets, robots
+from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.mjcf import arm_mjcf
+from contactsafe.robot.panda import PANDA
+from contactsafe.robot.franka import HAND
+
+HERE, THERE = (0.4, -0.3, 0.8), (-0.2, 0.5, 0.3)
+TURN, TURNED = (0.9, 0.1, -0.3, 0.2), (0.6, -0.2, 0.1, 0.7)
+
+
+def arm_at(position, turn):
+    return robots.from_mjcf(cell(position, turn), site="left/tcp")
+
+
+def driven(controller, arm, ticks=60):
+    """Swing about home under a target beside the tool; return torque, tool position, orientation and velocity."""
+    rows = []
+    start = arm.tool_pose(arm.home)
+    target = Target(Pose(start.position + [0.02, 0.0, 0.01], start.quat), STIFFNESS)
+    for k in range(ticks):
+        q, qd = arm.home + 0.01 * np.sin(0.02 * k + np.arange(7)), 0.2 * np.cos(0.02 * k + np.arange(7))
+        out = controller.step(Measurement(q, qd, UNTOUCHED), target)
+        rows.append(np.concatenate([out.torque, out.error, out.residual, out.contact.torque]))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("payload", [None, Payload(0.7, np.array([0.01, 0.0, 0.04]), np.eye(3) * 1e-3)])
+def test_a_base_that_was_moved_needed_a_new_controller(payload):
+    """Told, or built there: the same; a payload before or after changes nothing of it."""
+    built = arm_at(THERE, TURNED)
+    told, model = Controller(arm_at(HERE, TURN)), Controller(built)
+    for one in (told, model):
+        if payload is not None:
+            one.set_payload(*payload)
+    told.set_base(Pose(np.array(THERE), np.array(TURNED) / np.linalg.norm(TURNED)))
+    for one in (told, model):
+        one.reset(built.home)
+    assert_allclose(driven(told, built), driven(model, built), rtol=1e-6, atol=1e-6)
+
+
+def platform():
+    """A Panda on a platform far heavier than itself, which slides and lifts."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = 0.001
+    cart = spec.worldbody.add_body(name="platform", mass=1e7, inertia=[1e7] * 3, gravcomp=1.0)
+    for axis in ([1, 0, 0], [0, 0, 1]):
+        cart.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    spec.attach(mujoco.MjSpec.from_string(arm_mjcf(PANDA, HAND)), prefix="", frame=cart.add_frame())
+    model = spec.compile()
+    joints = [model.joint(i).name for i in range(2, model.njnt)]
+    return model, robots.from_mjcf(model, site="tcp", joints=joints)
+
+
+def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
+    """Hold the tool while the platform sways and lifts; return how far it is off, (ticks,), m, and whether touched."""
+    model, arm = platform()
+    data, at, controller = mujoco.MjData(model), arm.bind(model), Controller(arm, presets.safe())
+    data.qpos[at.qpos] = arm.home
+    data.qvel[:2] = [size * rate, 0.5 * size * rate]
+    controller.reset(arm.home)
+    start = arm.tool_pose(arm.home)
+    target = Target(start, np.array([300.0] * 3 + [400.0] * 3))
+    off, touched = [], 0
+    base = data.body("platform")
+    for k in range(int(1000 * seconds)):
+        phase = 0.001 * k * rate
+        velocity = np.array([size * rate * math.cos(phase), 0.0, 0.5 * size * rate * math.cos(phase), 0.0, 0.0, 0.0])
+        tell(controller, Pose(base.xpos.copy(), base.xquat.copy()), velocity)
+        out = controller.step(Measurement(data.qpos[at.qpos], data.qvel[at.dof], UNTOUCHED), target)
+        data.ctrl[at.ctrl] = out.torque / at.gear
+        data.qfrc_applied[:2] = -1e7 * rate * rate * size * math.sin(phase) * np.array([1.0, 0.5])
+        mujoco.mj_step(model, data)
+        mujoco.mj_kinematics(model, data)
+        off.append(np.linalg.norm(data.site("tcp").xpos - start.position))
+        touched += out.contact.in_contact
+    return np.array(off), touched
+
+
+def test_the_tool_stays_while_the_base_moves_under_it():
+    def tell(controller, pose, velocity):
+        controller.set_base(pose, velocity)
+
+    off, touched = hold_while_it_moves(tell)
+    assert off.max() < 0.002
+    assert touched == 0
+
+
+def test_a_base_that_moves_untold_carries_the_tool_along():
+    off, _ = hold_while_it_moves(lambda controller, pose, velocity: None, seconds=1.0)
+    assert off.max() > 0.03
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((Pose([0, 0, np.nan], [1, 0, 0, 0]),), "pose.position"),
+        ((Pose([0, 0, 0], [1, 1, 0, 0]),), "pose.quat has length 1.414; give a unit quaternion"),
+        ((Pose([0, 0, 0], [1, 0, 0, 0]), np.zeros(3)), "velocity has shape"),
+        ((Pose([0, 0, 0], [1, 0, 0, 0]), np.zeros(6), np.zeros(6)), "acceleration has shape"),
+    ],
+)
+def test_what_is_no_base_is_refused_and_the_last_one_holds(panda, arguments, text):
+    controller = Controller(panda)
+    controller.reset(panda.home)
+    before = controller.record["handle"].copy()
+    with pytest.raises(InvalidInputError, match=text):
+        controller.set_base(*arguments)
+    assert controller.record["handle"] == before
+
+
+def test_a_sensor_under_a_base_that_was_moved_is_refused(panda):
+    controller = Controller(panda)
+    controller.set_base(Pose(np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.0, 0.0])))
+    controller.reset(panda.home)
+    with pytest.raises(InvalidInputError, match="wrench_base is known for a base that stands"):
+        controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED, wrench_base=np.zeros(6)))
