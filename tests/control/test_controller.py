@@ -9,7 +9,6 @@ from contactsafe import Controller, Measurement, Pose, Target, presets
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.errors import InvalidInputError, UnreachableError
 
-
 OUTSIDE = "is outside [10, 1500] and not 0; scale it or widen stiffness_range of the ControllerConfig"
 
 

@@ -11,9 +11,9 @@ from tests.robot.worlds import cell
 
 from contactsafe import Controller, Measurement, Payload, Pose, Target, presets, robots
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.robot.franka import HAND
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA
-from contactsafe.robot.franka import HAND
 
 HERE, THERE = (0.4, -0.3, 0.8), (-0.2, 0.5, 0.3)
 TURN, TURNED = (0.9, 0.1, -0.3, 0.2), (0.6, -0.2, 0.1, 0.7)
@@ -27,7 +27,7 @@ def driven(controller, arm, ticks=60):
     """Swing about home under a target beside the tool; return torque, tool position, orientation and velocity."""
     rows = []
     start = arm.tool_pose(arm.home)
-    target = Target(Pose(start.position + [0.02, 0.0, 0.01], start.quat), STIFFNESS)
+    target = Target(Pose(start.position + np.array([0.02, 0.0, 0.01]), start.quat), STIFFNESS)
     for k in range(ticks):
         q, qd = arm.home + 0.01 * np.sin(0.02 * k + np.arange(7)), 0.2 * np.cos(0.02 * k + np.arange(7))
         out = controller.step(Measurement(q, qd, UNTOUCHED), target)
