@@ -37,7 +37,7 @@ def begun():
 def test_damping_of_the_approach_takes_energy_out_and_leaves_what_recedes(seed, damping):
     M, _, direction, qd = scene(seed)
     tau = np.zeros(7)
-    damp_approach(tau, direction, qd, True, M, np.zeros(7), 300.0, damping)
+    damp_approach(tau, direction, qd, False, M, np.zeros(7), 300.0, damping)
     if direction @ qd >= 0.0:
         assert_array_equal(tau, 0.0)
     else:
@@ -94,7 +94,7 @@ def test_arm_drifted_half_a_metre_after_what_it_touched_had_gone(seed):
     """While the contact is not yet over the task is let go: motion to either side is braked."""
     M, _, direction, qd = scene(seed)
     tau = np.zeros(7)
-    damp_approach(tau, direction, qd, False, M, np.zeros(7), 300.0, 50.0)
+    damp_approach(tau, direction, qd, True, M, np.zeros(7), 300.0, 50.0)
     assert tau @ qd < 0.0
 
 

@@ -89,7 +89,7 @@ def damp_approach(
     tau: Vector,
     direction: Vector,
     qd: Vector,
-    presses: bool,
+    gone: bool,
     M: Matrix,
     joint_damping: Vector,
     rate: float,
@@ -97,20 +97,20 @@ def damp_approach(
 ) -> None:
     """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
 
-    Where nothing presses any more motion away from it is braked too: an arm that has let its task go would drift on.
+    Where it seems to be gone motion away from it is braked too: an arm that has let its task go would drift on.
 
     Args:
         tau: command less c and g, (n,), N m; updated.
         direction: a, of the contact's torque on the arm, (n,).
         qd: (n,), rad/s.
-        presses: whether the contact's torque stands out.
+        gone: whether nothing has pressed for a while.
         M: joint inertia, (n, n), kg m².
         joint_damping: that acts already, (n,), N m s/rad.
         rate: largest damping per inertia of all of it, 1/s.
         damping: d, N m s/rad.
     """
     speed = dot(direction, qd)
-    if damping > 0.0 and (speed < 0.0 or not presses):
+    if damping > 0.0 and (speed < 0.0 or gone):
         d = min(damping, braking_limit(direction, M, joint_damping, rate))
         for i in range(tau.shape[0]):
             tau[i] -= d * speed * direction[i]

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from contactsafe.control import contact_bound, reaction
-from contactsafe.control.classification import STANDS_OUT_NM
 from contactsafe.control.clock import set_step
 from contactsafe.control.codes import (
     BAD_MEASUREMENT,
@@ -18,6 +17,7 @@ from contactsafe.control.codes import (
     MISSING,
     NO_TORQUE,
 )
+from contactsafe.control.detection import GONE_TICKS
 from contactsafe.control.estimation import (
     estimate,
     follow_arm,
@@ -180,9 +180,9 @@ def _contact_law(
     if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
         rate = c.params.limits.braking_rate - impedance.task_damping
-        presses = state.classification.torque_smooth_nm > STANDS_OUT_NM
+        gone = state.detection.quiet_ticks > GONE_TICKS
         reaction.damp_approach(
-            tau, direction, qd, presses, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping
+            tau, direction, qd, gone, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping
         )
     return tau
 
