@@ -56,10 +56,12 @@ def platform():
     cart = spec.worldbody.add_body(name="platform", mass=1e7, inertia=[1e7] * 3, gravcomp=1.0)
     for axis in ([1, 0, 0], [0, 0, 1]):
         cart.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    spec.attach(mujoco.MjSpec.from_string(arm_mjcf(PANDA, HAND)), prefix="", frame=cart.add_frame())
+    panda = mujoco.MjSpec.from_string(arm_mjcf(PANDA, HAND))
+    panda.option.cone, panda.option.jacobian = spec.option.cone, spec.option.jacobian  # or MuJoCo warns
+    spec.attach(panda, prefix="its_", frame=cart.add_frame())
     model = spec.compile()
     joints = [model.joint(i).name for i in range(2, model.njnt)]
-    return model, robots.from_mjcf(model, site="tcp", joints=joints)
+    return model, robots.from_mjcf(model, site="its_tcp", joints=joints)
 
 
 def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
@@ -68,6 +70,7 @@ def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
     data, at, controller = mujoco.MjData(model), arm.bind(model), Controller(arm, presets.safe())
     data.qpos[at.qpos] = arm.home
     data.qvel[:2] = [size * rate, 0.5 * size * rate]
+    mujoco.mj_forward(model, data)
     controller.reset(arm.home)
     start = arm.tool_pose(arm.home)
     target = Target(start, np.array([300.0] * 3 + [400.0] * 3))
@@ -82,7 +85,7 @@ def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
         data.qfrc_applied[:2] = -1e7 * rate * rate * size * math.sin(phase) * np.array([1.0, 0.5])
         mujoco.mj_step(model, data)
         mujoco.mj_kinematics(model, data)
-        off.append(np.linalg.norm(data.site("tcp").xpos - start.position))
+        off.append(np.linalg.norm(data.site("its_tcp").xpos - start.position))
         touched += out.contact.in_contact
     return np.array(off), touched
 

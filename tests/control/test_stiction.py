@@ -1,5 +1,6 @@
 """Dry friction that a file declares is overcome in the direction of the command, at rest, and by no more than it is."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +28,7 @@ def declared(arm, dry_nm):
 
 def off_after_a_move(arm, config):
     """Move the tool of an arm with that friction by 2 cm; return how far off it ends, m."""
-    plant = Plant(arm)
+    plant = Plant(arm, model=copy.deepcopy(arm.model))
     plant.model.dof_frictionloss[:] = DRY_NM
     controller, target = controller_at(arm, config), reach(arm, [0.0, 0.02, 0.0])
     plant.run(controller, target, 2500)
@@ -43,7 +44,7 @@ def test_tool_ends_nearer_to_its_target(panda):
 
 def test_stiction_that_holds_the_arm_still_is_no_contact(panda):
     arm = declared(panda, DRY_NM)
-    plant = Plant(arm)
+    plant = Plant(arm, model=copy.deepcopy(arm.model))
     plant.model.dof_frictionloss[:] = DRY_NM
     controller, target, seen = controller_at(arm, SAFE), reach(arm, [0.0, 0.02, 0.0]), []
     plant.run(controller, target, 1500, each=lambda out: seen.append(out.contact.in_contact))
@@ -70,7 +71,7 @@ def test_nothing_is_added_in_motion_or_where_nothing_is_declared(panda):
 
 def test_arm_that_holds_still_and_has_the_friction_stays(panda):
     arm = declared(panda, DRY_NM)
-    plant, controller = Plant(arm), controller_at(arm, SAFE)
+    plant, controller = Plant(arm, model=copy.deepcopy(arm.model)), controller_at(arm, SAFE)
     plant.model.dof_frictionloss[:] = DRY_NM
     before = plant.tool_position()
     for _ in range(500):

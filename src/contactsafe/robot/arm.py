@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.core.rotation import matrix_to_quat
+from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
 from contactsafe.robot.binding import Binding, bind_joints
 from contactsafe.robot.description import ArmDescription, Tool
 from contactsafe.robot.dynamics import dynamics_dtype, forward_kinematics, update_dynamics
 from contactsafe.robot.mjcf import TOOL_SITE, arm_mjcf
-from contactsafe.robot.nominal import NominalModel
+from contactsafe.robot.nominal import Frame, NominalModel
 from contactsafe.robot.soundness import array_of, as_numbers, refuse_unsound
 from contactsafe.robot.surface import SURFACE_COLUMNS, capsule_surface
 from contactsafe.robot.touchable import capsule_places, touchable
@@ -62,6 +62,8 @@ class Arm(Independent):
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
 
+        base: where the body that carries the first joint stands in `model`; None for what the model says.
+
     Raises:
         InvalidInputError: gravity, the model, a limit, friction, drag or home is not finite or not one row a joint, a
             mass or friction is negative, or a joint's range is empty.
@@ -87,6 +89,7 @@ class Arm(Independent):
     sensor_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     sensor_drag: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     calibrated: bool = False
+    base: Pose | None = None
 
     def __post_init__(self) -> None:
         """Take numbers as arrays, and refuse what no arm can be."""
@@ -126,7 +129,8 @@ class Arm(Independent):
 
     def nominal(self) -> NominalModel:
         """Make a copy of the nominal model for one controller or one thread."""
-        return NominalModel(self.model, self.site, self.surface, self.places)
+        base = None if self.base is None else Frame(self.base.position, quat_to_matrix(self.base.quat))
+        return NominalModel(self.model, self.site, self.surface, self.places, base)
 
     def joint_vector(self, value: ArrayLike, name: str) -> np.ndarray:
         """Check a joint-space vector at the door.

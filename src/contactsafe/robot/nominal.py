@@ -40,8 +40,11 @@ class NominalModel(Independent):
 
     _bound = ("_data", "handle")
 
-    def __init__(self, model: mujoco.MjModel, site: str, surface: np.ndarray, places: np.ndarray):
+    def __init__(
+        self, model: mujoco.MjModel, site: str, surface: np.ndarray, places: np.ndarray, base: Frame | None = None
+    ):
         self._model, self._own = model, False
+        self._base = _base_frame(model) if base is None else base
         self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
         self._places = np.ascontiguousarray(places, dtype=float)
         self._twist, self._acceleration = np.zeros(6), np.zeros(3)
@@ -65,14 +68,13 @@ class NominalModel(Independent):
         """
         if not self._own:
             self._model, self._own = copy.deepcopy(self._model), True
-            self._stands = _frames(self._model)
+            self._stands = _standing(self._model)
             self._gravity = self._model.opt.gravity.copy()
             self._bind()
-        moved = base.of(self._stands[_base_body(self._model)].inverse())
+        moved = base.of(self._base.inverse())
         for body, stands in self._stands.items():
-            if body > 0 and self._model.body_parentid[body] == 0:
-                frame = moved.of(stands)
-                self._model.body_pos[body], self._model.body_quat[body] = frame.position, matrix_to_quat(frame.rotation)
+            frame = moved.of(stands)
+            self._model.body_pos[body], self._model.body_quat[body] = frame.position, matrix_to_quat(frame.rotation)
         self._twist, self._acceleration = twist, acceleration
         self._model.opt.gravity[:] = self._gravity - acceleration
         self.handle["base_position"] = base.position
@@ -84,16 +86,15 @@ class NominalModel(Independent):
         self.handle["gravity"] = self._model.opt.gravity
 
 
-def _base_body(model: mujoco.MjModel) -> int:
-    return int(model.body_parentid[model.jnt_bodyid[0]])
-
-
-def _frames(model: mujoco.MjModel) -> dict[int, Frame]:
-    """Return where the world, what stands in it and the base are in the model."""
+def _base_frame(model: mujoco.MjModel) -> Frame:
+    """Return where the body that carries the first joint is."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    body = int(model.body_parentid[model.jnt_bodyid[0]])
+    return Frame(data.xpos[body].copy(), quat_to_matrix(data.xquat[body]))
+
+
+def _standing(model: mujoco.MjModel) -> dict[int, Frame]:
+    """Return where the bodies that stand in the world are in it."""
     standing = [body for body in range(1, model.nbody) if model.body_parentid[body] == 0]
-    return {
-        body: Frame(data.xpos[body].copy(), quat_to_matrix(data.xquat[body]))
-        for body in (0, *standing, _base_body(model))
-    }
+    return {body: Frame(model.body_pos[body].copy(), quat_to_matrix(model.body_quat[body])) for body in standing}

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from contactsafe.core.errors import InvalidInputError, shown
 from contactsafe.core.rotation import matrix_to_quat
-from contactsafe.robot.arm import Arm, finite_array
+from contactsafe.robot.arm import Arm, Pose, finite_array
 from contactsafe.robot.bodies import inertia_of, link_of, shown_by
 from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
@@ -170,9 +170,11 @@ def _arm(found: Found, options: ArmOptions, findings: Findings) -> Arm:
     )
     note_home(model, data, chain, home, findings)
     note_unserved(model, chain, nominal, home, findings)
+    base = model.body_parentid[model.jnt_bodyid[chain[0]]]
     return Arm(
         name, nominal, str(mujoco.mj_id2name(model, SITE, found.site)), q_min, q_max, np.full(n, np.inf), limits, rate,
         friction, home, description, tool, surface, _LEVER_DOUBTED, drag=drag, friction_unknown=unknown,
+        base=Pose(data.xpos[base].copy(), data.xquat[base].copy()),
     )  # fmt: skip
 
 
