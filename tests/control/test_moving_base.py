@@ -95,7 +95,7 @@ def test_the_tool_stays_while_the_base_moves_under_it():
         controller.set_base(pose, velocity)
 
     off, touched = hold_while_it_moves(tell)
-    assert off.max() < 0.002
+    assert off[500:].max() < 0.001  # at first the arm, at rest on a moving base, goes along
     assert touched == 0
 
 
