@@ -42,22 +42,34 @@ def test_straight_moves_raised_unreachable_error(arm):
     assert str(out.fault) == "none"
 
 
+def turned(arm, pose, quat):
+    """Return how far a pose is turned from an orientation, rad."""
+    return float(np.linalg.norm(orientation_error(quat, quat_to_matrix(pose.quat))))
+
+
 def test_of_the_orientations_at_the_position_the_nearest_is_taken(arm):
-    """No other posture with the tool at the position, near by, turns it nearer."""
+    """No posture with the tool at the position turns it nearer, of those that lead there from it step by step."""
     ik, rng = InverseKinematics(arm), np.random.default_rng(0)
-    asked = arm.tool_pose(arm.home + 0.2)
-    asked = Pose(asked.position, arm.tool_pose(arm.home - 0.1).quat)
+    asked = Pose(arm.tool_pose(arm.home + 0.2).position, arm.tool_pose(arm.home - 0.1).quat)
     q = ik.posture(asked)
-    found = arm.tool_pose(q)
-    assert np.linalg.norm(found.position - asked.position) <= POSITION_TOLERANCE
-
-    def turn(pose):
-        return np.linalg.norm(orientation_error(asked.quat, quat_to_matrix(pose.quat)))
-
+    assert np.linalg.norm(arm.tool_pose(q).position - asked.position) <= POSITION_TOLERANCE
+    nearest = turned(arm, arm.tool_pose(q), asked.quat)
     for _ in range(20):
-        other = arm.tool_pose(q + 0.03 * rng.normal(size=arm.n))
-        other = arm.tool_pose(ik.solve(Pose(asked.position, other.quat), q))
-        assert turn(other) > turn(found) - 0.01
+        beside = arm.tool_pose(q + rng.choice([0.1, 0.3]) * rng.normal(size=arm.n))
+        other = ik.solve(Pose(asked.position, beside.quat), q)
+        assert turned(arm, arm.tool_pose(other), asked.quat) > nearest - 0.003
+
+
+def test_a_posture_that_was_given_does_not_turn_the_tool(arm):
+    """It says where the joints are to be if they can; the orientation asked for is that of the pose."""
+    plant = Plant(arm)
+    controller, start = controller_at(arm, presets.safe()), arm.tool_pose(arm.home)
+    target = Target(moved(start, np.array([-0.05, 0.0, -0.05])), K, posture=arm.home)
+    plant.run(controller, target, 1500, UNTOUCHED)
+    assert np.linalg.norm(plant.tool_position() - target.pose.position) < 0.002
+    best = arm.tool_pose(InverseKinematics(arm).posture(target.pose))
+    reached = arm.tool_pose(plant.q)
+    assert turned(arm, reached, start.quat) < turned(arm, best, start.quat) + 0.02
 
 
 def test_out_of_reach_is_refused_with_the_distance_alone(arm):
@@ -78,3 +90,15 @@ def test_a_direction_of_no_stiffness_is_let_go(panda):
     assert abs(out.error[5]) > 0.3
     assert np.linalg.norm(out.error[:3]) < 0.01
     assert np.abs(out.error[3:5]).max() < 0.1
+
+
+def test_a_direction_that_was_let_go_stays_so_where_no_target_comes(panda):
+    """It has no place to come to, and what held it is not a number."""
+    plant, controller = Plant(panda), controller_at(panda, presets.safe())
+    start = panda.tool_pose(panda.home)
+    target = Target(moved(start, np.array([0.05, 0.0, 0.0])), np.array([200.0, 0.0, 200.0, 400.0, 400.0, 0.0]))
+    out = plant.run(controller, target, 60, UNTOUCHED)
+    out = plant.run(controller, None, 1500, UNTOUCHED)
+    assert out.target_late
+    assert np.isfinite(out.torque).all()
+    assert np.abs(plant.qd).max() < 0.01

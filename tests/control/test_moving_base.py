@@ -1,11 +1,13 @@
 """A base that stands elsewhere than the model has it, or moves: on a lift, a gantry, a mobile platform."""
 
+import copy
 import math
+import pickle
 
 import mujoco
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from tests.control.plant import STIFFNESS, UNTOUCHED
 from tests.robot.worlds import cell
 
@@ -15,6 +17,7 @@ from contactsafe.robot.franka import HAND
 from contactsafe.robot.mjcf import arm_mjcf
 from contactsafe.robot.panda import PANDA
 
+HOME_POSE = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 HERE, THERE = (0.4, -0.3, 0.8), (-0.2, 0.5, 0.3)
 TURN, TURNED = (0.9, 0.1, -0.3, 0.2), (0.6, -0.2, 0.1, 0.7)
 
@@ -24,29 +27,48 @@ def arm_at(position, turn):
 
 
 def driven(controller, arm, ticks=60):
-    """Swing about home under a target beside the tool; return torque, tool position, orientation and velocity."""
+    """Swing about home under a target beside the tool; return torque, error and residual of every tick."""
     rows = []
     start = arm.tool_pose(arm.home)
     target = Target(Pose(start.position + np.array([0.02, 0.0, 0.01]), start.quat), STIFFNESS)
     for k in range(ticks):
         q, qd = arm.home + 0.01 * np.sin(0.02 * k + np.arange(7)), 0.2 * np.cos(0.02 * k + np.arange(7))
         out = controller.step(Measurement(q, qd, UNTOUCHED), target)
-        rows.append(np.concatenate([out.torque, out.error, out.residual, out.contact.torque]))
+        rows.append(np.concatenate([out.torque, out.error, out.residual]))
     return np.array(rows)
 
 
-@pytest.mark.parametrize("payload", [None, Payload(0.7, np.array([0.01, 0.0, 0.04]), np.eye(3) * 1e-3)])
-def test_a_base_that_was_moved_needed_a_new_controller(payload):
-    """Told, or built there: the same; a payload before or after changes nothing of it."""
+LOAD = Payload(0.7, np.array([0.01, 0.0, 0.04]), np.eye(3) * 1e-3)
+THERE_POSE = Pose(np.array(THERE), np.array(TURNED) / np.linalg.norm(TURNED))
+TOLD = {
+    "base": lambda one: one.set_base(THERE_POSE),
+    "base, payload": lambda one: (one.set_base(THERE_POSE), one.set_payload(*LOAD)),
+    "payload, base": lambda one: (one.set_payload(*LOAD), one.set_base(THERE_POSE)),
+    "base, copy": lambda one: one.set_base(THERE_POSE),
+}
+
+
+@pytest.mark.parametrize("order", TOLD)
+def test_a_base_that_was_moved_needed_a_new_controller(order):
+    """Told, or built there: the same."""
     built = arm_at(THERE, TURNED)
     told, model = Controller(arm_at(HERE, TURN)), Controller(built)
-    for one in (told, model):
-        if payload is not None:
-            one.set_payload(*payload)
-    told.set_base(Pose(np.array(THERE), np.array(TURNED) / np.linalg.norm(TURNED)))
+    TOLD[order](told)
+    if "payload" in order:
+        model.set_payload(*LOAD)
+    if "copy" in order:
+        told = pickle.loads(pickle.dumps(told))
     for one in (told, model):
         one.reset(built.home)
     assert_allclose(driven(told, built), driven(model, built), rtol=1e-6, atol=1e-6)
+
+
+def test_a_copy_knows_how_the_base_moves(panda):
+    moving = Controller(panda)
+    moving.set_base(THERE_POSE, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.3]))
+    for one in (copy.copy(moving), pickle.loads(pickle.dumps(moving))):
+        for name in ("base_position", "base_twist", "gravity"):
+            assert_array_equal(one.record["handle"][name], moving.record["handle"][name])
 
 
 def platform():
@@ -64,10 +86,10 @@ def platform():
     return model, robots.from_mjcf(model, site="its_tcp", joints=joints)
 
 
-def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
+def hold_while_it_moves(tell, preset=presets.safe, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
     """Hold the tool while the platform sways and lifts; return how far it is off, (ticks,), m, and whether touched."""
     model, arm = platform()
-    data, at, controller = mujoco.MjData(model), arm.bind(model), Controller(arm, presets.safe())
+    data, at, controller = mujoco.MjData(model), arm.bind(model), Controller(arm, preset())
     data.qpos[at.qpos] = arm.home
     data.qvel[:2] = [size * rate, 0.5 * size * rate]
     mujoco.mj_forward(model, data)
@@ -90,11 +112,12 @@ def hold_while_it_moves(tell, seconds=3.0, size=0.05, rate=2.0 * math.pi * 0.5):
     return np.array(off), touched
 
 
-def test_the_tool_stays_while_the_base_moves_under_it():
+@pytest.mark.parametrize("preset", [presets.safe, presets.vices])
+def test_the_tool_stays_while_the_base_moves_under_it(preset):
     def tell(controller, pose, velocity):
         controller.set_base(pose, velocity)
 
-    off, touched = hold_while_it_moves(tell)
+    off, touched = hold_while_it_moves(tell, preset)
     assert off[500:].max() < 0.001  # at first the arm, at rest on a moving base, goes along
     assert touched == 0
 
@@ -104,9 +127,22 @@ def test_a_base_that_moves_untold_carries_the_tool_along():
     assert off.max() > 0.03
 
 
+def test_velocities_tell_the_acceleration_and_a_reset_forgets_it(panda):
+    controller = Controller(panda)
+    controller.reset(panda.home)
+    for k in range(200):
+        controller.set_base(HOME_POSE, np.array([2.0 * 0.001 * k, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED))
+    assert_allclose(controller.record["handle"]["gravity"], [-2.0, 0.0, -9.81], atol=0.05)
+    controller.reset(panda.home)
+    controller.set_base(HOME_POSE, np.zeros(6))
+    assert_allclose(controller.record["handle"]["gravity"], [0.0, 0.0, -9.81], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (("here",), "pose is str; give a contactsafe.Pose"),
         ((Pose([0, 0, np.nan], [1, 0, 0, 0]),), "pose.position"),
         ((Pose([0, 0, 0], [1, 1, 0, 0]),), "pose.quat has length 1.414; give a unit quaternion"),
         ((Pose([0, 0, 0], [1, 0, 0, 0]), np.zeros(3)), "velocity has shape"),

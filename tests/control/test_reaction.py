@@ -106,9 +106,7 @@ def test_damping_made_a_tool_late_that_moves_while_its_arm_is_pushed(params, see
     J_bar = M_inv @ J.T @ np.linalg.inv(J @ M_inv @ J.T)
     N_t = np.eye(7) - J_bar @ J
     damping = np.zeros(7)
-    damp_contact(damping, mode, N_t, np.zeros((7, 7)), qd, np.ones(7), params)
+    damp_contact(damping, mode, N_t, N_t, qd, np.ones(7), params)
     resisted = np.linalg.norm(J @ M_inv @ damping) > 1e-9 * np.linalg.norm(damping)
     assert resisted == (mode == COMPLY)
-    in_null, damping = N_t @ qd, np.zeros(7)
-    damp_contact(damping, mode, N_t, np.zeros((7, 7)), in_null, np.ones(7), params)
-    assert in_null @ damping < 0.0
+    assert qd @ damping < 0.0

@@ -138,6 +138,13 @@ def test_a_wish_to_stop_is_followed_at_once_by_its_name(door):
     assert door.follow(101, stop=states.ASKED) == (states.STOPPING, states.ASKED)
 
 
+def test_a_direction_that_the_policy_let_go_is_held_when_it_falls_silent(door):
+    stiffness = np.array([150.0, 0.0, 150.0, 150.0, 150.0, 0.0])
+    assert door.hand_in(100, K_task=stiffness) == states.NONE
+    assert door.follow(100 + OLD_TICKS + 1)[0] == states.HELD
+    assert (door.target["K_task"] >= 150.0).all()
+
+
 def test_a_held_arm_is_told_to_stay_where_its_tool_coasts_to_once(door):
     door.hand_in(100, of_tick=100)
     out = door.controller.record["output"]

@@ -125,10 +125,15 @@ def checked_slot(arm: Arm, records: np.ndarray | None, index: int) -> tuple[np.n
     return records, int(index)
 
 
-def refuse_overload(load: Payload, loaded: Arm, before: Arm, q: np.ndarray) -> None:
-    """Refuse what the motors do not hold where the arm is, unless it is less than they are said to hold already."""
-    still = np.zeros(len(q))
-    need, needed = (np.abs(arm.dynamics(q, still)["g"]) / arm.tau_max for arm in (loaded, before))
+def refuse_overload(load: Payload, loaded: Arm, gravity: np.ndarray, before: np.ndarray) -> None:
+    """Refuse what the motors do not hold where the arm is, unless it is less than they are said to hold already.
+
+    Args:
+        load: that is to be carried.
+        loaded: the arm with it.
+        gravity, before: torques that hold the arm with it and without, (n,), N m.
+    """
+    need, needed = np.abs(gravity) / loaded.tau_max, np.abs(before) / loaded.tau_max
     over = (need > 1.0) & (need > needed)
     if over.any():
         i = int(np.argmax(need * over))

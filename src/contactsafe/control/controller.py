@@ -26,6 +26,7 @@ from contactsafe.robot.arm import Arm, Pose, finite_array, require_arm, unit_qua
 from contactsafe.robot.dynamics import dynamics_dtype, update_dynamics
 from contactsafe.robot.ik import InverseKinematics
 from contactsafe.robot.ik_few_joints import FEW
+from contactsafe.robot.nominal import NominalModel
 from contactsafe.robot.payload import Payload, carrying, checked_payload
 
 RANGE_TOLERANCE = 0.02
@@ -69,7 +70,7 @@ class Controller(Instance):
         config = checked_config(config)
         _warm_up(arm, config)
         self._ik = InverseKinematics(arm)
-        self._loaded, self._base, self._base_tick = arm, MovingBase(), 0
+        self._loaded, self._base = arm, MovingBase()
         super().__init__(arm, config, records, index)
         self._last_numbers: list = []
 
@@ -103,13 +104,14 @@ class Controller(Instance):
         q = in_range(self.arm, self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
         qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
         qd = believable(qd, self.record["params"]["arm"]["qd_most"])
-        dynamics = self._dynamics(q, qd)
+        dynamics = _dynamics(self._nominal, q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else within_limit(self.arm, torque)
         allowed = self.config.impedance.stiffness_range
         held_by = np.clip(np.full(6, _HELD_STIFFNESS), *allowed)
         if stiffness is not None:
             held_by = checked_stiffness(stiffness, allowed)
         self.forget()
+        self._base.forget_motion()
         self.record["dynamics"] = dynamics
         state = self.record["state"]
         state["command"]["tau"], state["clock"]["q_good"] = tau, q
@@ -159,10 +161,13 @@ class Controller(Instance):
             raise InvalidInputError(f"in_wrench = {in_wrench!r} is no answer; give True, False or None")
         loaded = carrying(self.arm, load)
         q = self.record["state"]["clock"]["q_good"] if self._is_reset else self.arm.home
-        refuse_overload(load, loaded, self._loaded, q)
+        nominal = loaded.nominal()
+        self._base.place(nominal)
+        still = np.zeros(self.arm.n)
+        refuse_overload(load, loaded, *(_dynamics(known, q, still)["g"] for known in (nominal, self._nominal)))
         gravity, rotation = self.record["handle"]["gravity"], self.record["dynamics"]["rotation"]
         weight = payload_weight_into(self._records["payload"][self._index], rotation, gravity, np.zeros(6))
-        self._loaded, self._nominal = loaded, loaded.nominal()
+        self._loaded, self._nominal = loaded, nominal
         self._place()
         known = self.record["payload"]
         known["mass"], known["com"], known["inertia"] = load
@@ -176,19 +181,20 @@ class Controller(Instance):
 
         Targets, wrenches and outputs stay in world axes: a target that holds is held while the base moves under it.
         Tilting turns gravity with it. What is not told is felt as a contact; the accelerations of a base that turns
-        fast (from about 1 rad/s or 1 rad/s²) are.
+        fast (from about 1 rad/s or 1 rad/s²) are. What was told holds until the next call, a reset included: once the
+        base has stopped, say so. Where a target cannot be reached from there, the next `step` with it raises
+        UnreachableError.
 
         Args:
-            pose: of the body that carries the first joint, world; position (3,) m, unit quaternion w x y z (4,).
+            pose: of the body in which the first joint's axis is fixed, world; position (3,) m, unit quaternion
+                w x y z (4,).
             velocity: of its origin, world axes, (6,), m/s and rad/s; None for a base that stands.
             acceleration: of its origin, (3,), m/s²; None for that of the velocities told so far, smoothed.
 
         Raises:
             InvalidInputError: a wrong shape, a number that is not finite, or a quaternion that is not of unit length.
         """
-        ticks = self.record["state"]["link_masses"]["ticks"]
-        self._base.tell(pose, velocity, acceleration, self.config.clock.dt * float(ticks - self._base_tick))
-        self._base_tick = int(ticks)
+        self._base.tell(pose, velocity, acceleration)
         self._place()
         if self._base.is_elsewhere():
             self._last_numbers = []
@@ -220,11 +226,6 @@ class Controller(Instance):
             return checked_payload(0.0)
         return Payload(mass, (known.mass * known.com + found["load"][1:]) / mass, np.zeros((3, 3)))
 
-    def _dynamics(self, q: np.ndarray, qd: np.ndarray) -> np.void:
-        out = np.zeros(1, dtype=dynamics_dtype(self.arm.n))
-        update_dynamics(self._nominal.handle, q, qd, out[0])
-        return out[0]
-
     def _last_torque(self, q: np.ndarray, dynamics: np.void) -> np.ndarray:
         """Return the torque that the arm is under, as far as this controller can know, (n,), N m."""
         state = self.record["state"]
@@ -250,6 +251,8 @@ class Controller(Instance):
             self.set_target(target)
         self.set_measurement(measurement)
         tick_at(self._ticked, self._index)
+        if self._base.is_told:
+            self._base.pass_time(float(self.record["state"]["clock"]["elapsed"]) * self.config.clock.dt)
         return output_of(self._reported)
 
     def set_measurement(self, measurement: Measurement) -> None:
@@ -274,16 +277,24 @@ class Controller(Instance):
         stiffness = checked_stiffness(target.stiffness, gains.stiffness_range)
         critical = np.maximum(2.0 * np.sqrt(stiffness), gains.damping_range[0])
         damping = checked_damping(critical if target.damping is None else target.damping, gains.damping_range)
+        wanted = self._base.in_model(Pose(position, quat))
         if target.posture is None:
-            pose = self._base.in_model(Pose(position, quat))
-            posture = self._ik.posture_near(pose, record["q_posture"].copy())
+            posture = self._ik.posture_near(wanted, record["q_posture"].copy())
         else:
             posture = in_range(self.arm, self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
         if self.arm.n < FEW:  # it is asked for no rotation that it cannot have there
-            quat = self._base.in_world(self.arm.tool_pose(posture)).quat
+            there = posture if target.posture is None else self._ik.solve(wanted, posture)
+            quat = matrix_to_quat(_dynamics(self._nominal, there, np.zeros(self.arm.n))["rotation"])
         record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers
+
+
+def _dynamics(nominal: NominalModel, q: np.ndarray, qd: np.ndarray) -> np.void:
+    """Return the `dynamics_dtype` record of a model where its base is."""
+    out = np.zeros(1, dtype=dynamics_dtype(len(q)))
+    update_dynamics(nominal.handle, q, qd, out[0])
+    return out[0]
 
 
 _WARM: set[int] = set()

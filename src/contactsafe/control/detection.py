@@ -14,8 +14,8 @@ _i = np.int64
 GRAVITY_SIGMAS = 3.0
 """Standard deviations of the unidentified weight that a threshold allows for."""
 
-GONE_TICKS = 100
-"""A contact that has been quiet for longer is most probably gone, and not about to bounce back."""
+GONE_S = 0.1
+"""A contact that has been quiet for longer, s, is most probably gone, and not about to bounce back."""
 
 _NOISE_SIGMAS = 6.0
 """Standard deviations of noise beyond what is allowed that a threshold allows for."""

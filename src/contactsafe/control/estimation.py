@@ -172,7 +172,11 @@ def _has_unknown_load(c: Record) -> bool:
     dry = known.friction[i, 0] + max(known.drag[i, 2], known.friction_unknown[i, 1])
     dry_friction = 0.0 if state.arm.has_torque != 0 else dry
     identify_payload(payload, row, torque, uncertainty, dry_friction, dt, known_kg)
-    return load_sags(payload, c.output.error, dynamics.velocity, gravity, known_kg, dt)
+    error, velocity = stack_vector(3), stack_vector(3)
+    for k in range(3):
+        error[k] = c.output.error[k] if state.target.K_task[k] > 0.0 else 0.0
+        velocity[k] = dynamics.velocity[k] + dynamics.carried_velocity[k]
+    return load_sags(payload, error, velocity, gravity, known_kg, dt)
 
 
 @compiled

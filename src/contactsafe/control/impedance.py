@@ -38,6 +38,10 @@ def impedance_dtype(n: int) -> np.dtype:
     )
 
 
+_LEAST_STIFFNESS = 10.0
+"""From which a direction that was let go comes back, 1/s²."""
+
+
 @compiled
 def passive_step(
     K: Vector,
@@ -45,7 +49,6 @@ def passive_step(
     K_wanted: Vector,
     D_wanted: Vector,
     dt: float,
-    stiffness_min: float,
     damping_min: float,
     limited: bool,
 ) -> None:
@@ -59,13 +62,12 @@ def passive_step(
         K, D: in force, (6,), 1/s² and 1/s; updated.
         K_wanted, D_wanted: (6,).
         dt: tick, s.
-        stiffness_min: least that holds anything, 1/s².
         damping_min: α, least damping that may ever be asked for, 1/s.
         limited: whether to limit at all.
     """
     for i in range(6):
         rise = K_wanted[i] - K[i] + damping_min * (D_wanted[i] - D[i])
-        most = 2.0 * damping_min * max(K[i], stiffness_min) * dt
+        most = 2.0 * damping_min * max(K[i], _LEAST_STIFFNESS) * dt
         fraction = most / rise if limited and rise > most else 1.0
         K[i] += fraction * (K_wanted[i] - K[i])
         D[i] += fraction * (D_wanted[i] - D[i])
@@ -75,8 +77,8 @@ def passive_step(
 def follow_gains(impedance: Record, target: Record, dt: float, params: Record) -> None:
     """Move the gains in force towards those of the target."""
     passive_step(
-        impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.stiffness_range[0],
-        params.damping_range[0], params.passive_gains != 0,
+        impedance.K_task, impedance.D_task, target.K_task, target.D_task, dt, params.damping_range[0],
+        params.passive_gains != 0,
     )  # fmt: skip
 
 

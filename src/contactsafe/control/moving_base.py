@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
 from contactsafe.robot.arm import Pose, finite_array, unit_quaternion
 from contactsafe.robot.nominal import Frame, NominalModel
@@ -26,24 +27,37 @@ class MovingBase:
     def __init__(self) -> None:
         self.is_told = False
         self._base, self._twist, self._acceleration = Frame(np.zeros(3), np.eye(3)), np.zeros(6), np.zeros(3)
+        self._before, self._passed_s = np.zeros(3), math.inf  # velocity told before, and time since
         self._model = self._postured = Frame(np.zeros(3), np.eye(3))  # the model's world: now, and at the last posture
 
-    def tell(self, pose: Pose, velocity: ArrayLike | None, acceleration: ArrayLike | None, passed_s: float) -> None:
-        """Take what `Controller.set_base` was given, so many seconds after the last.
+    def pass_time(self, seconds: float) -> None:
+        """Count the time of a tick."""
+        self._passed_s += seconds
+
+    def forget_motion(self) -> None:
+        """Begin anew with what velocities tell of the acceleration: time has gone by."""
+        self._passed_s, self._acceleration = math.inf, np.zeros(3)
+
+    def tell(self, pose: Pose, velocity: ArrayLike | None, acceleration: ArrayLike | None) -> None:
+        """Take what `Controller.set_base` was given.
 
         Raises:
             InvalidInputError: a wrong shape, a number that is not finite, or a quaternion that is not of unit length.
         """
+        if not isinstance(pose, Pose):
+            raise InvalidInputError(f"pose is {type(pose).__name__}; give a contactsafe.Pose")
         position = finite_array(pose.position, (3,), "pose.position")
         rotation = quat_to_matrix(unit_quaternion(pose.quat, "pose.quat"))
         twist = finite_array(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
         if acceleration is not None:
             self._acceleration = finite_array(acceleration, (3,), "acceleration")
-        elif velocity is None or not self.is_told:
+        elif velocity is None:
             self._acceleration = np.zeros(3)
-        elif passed_s > 0.0:
-            wanted = (twist[:3] - self._twist[:3]) / passed_s
-            self._acceleration = wanted + math.exp(-passed_s / _SMOOTH_S) * (self._acceleration - wanted)
+        elif 0.0 < self._passed_s < math.inf:
+            wanted = (twist[:3] - self._before) / self._passed_s
+            self._acceleration = wanted + math.exp(-self._passed_s / _SMOOTH_S) * (self._acceleration - wanted)
+        if self._passed_s > 0.0:
+            self._before, self._passed_s = twist[:3].copy(), 0.0
         self._base, self._twist, self.is_told = Frame(position, rotation), twist, True
 
     def place(self, nominal: NominalModel) -> None:
@@ -62,10 +76,6 @@ class MovingBase:
     def in_model(self, pose: Pose) -> Pose:
         """Return a pose of the world in what the model calls the world."""
         return _through(self._model.inverse(), pose) if self.is_told else pose
-
-    def in_world(self, pose: Pose) -> Pose:
-        """Return a pose of the model in the world."""
-        return _through(self._model, pose) if self.is_told else pose
 
 
 def _through(frame: Frame, pose: Pose) -> Pose:

@@ -233,8 +233,8 @@ def load_sags(payload: Record, error: Vector, velocity: Vector, gravity: Vector,
 
     Args:
         payload: `payload_dtype` record; its time is advanced.
-        error: of the tool, target less position, (6,), m and rad.
-        velocity: of the tool, (6,), m/s and rad/s.
+        error: of the tool, target less position, where it is held, (3,), m.
+        velocity: of the tool, (3,), m/s.
         gravity: (3,), m/s².
         known_kg: mass of the known payload.
         dt: that passed, s.

@@ -12,7 +12,7 @@ from contactsafe.control.codes import COMPLY, FREE, OBSTACLE, PUSH, REJECT
 from contactsafe.control.damping import braking_limit
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import dot, matvec_t_into
+from contactsafe.core.linalg import dot, matvec_into, matvec_t_into
 from contactsafe.core.stack import stack_vector
 
 _f = np.float64
@@ -140,4 +140,10 @@ def damp_contact(
     matvec_t_into(N_ct, scaled, beside_contact)
     for i in range(n):
         damping[i] -= params.null_damping * (in_null[i] - beside_contact[i])
-        damping[i] -= params.contact_damping * (in_null[i] if mode == REJECT else scaled[i])
+    if mode == REJECT:  # −N_tᵀ d N_t q̇: the projector is oblique, and only so nothing of the task's motion drives it
+        matvec_into(N_t, qd, beside_contact)
+        for i in range(n):
+            beside_contact[i] *= scale[i]
+        matvec_t_into(N_t, beside_contact, scaled)
+    for i in range(n):
+        damping[i] -= params.contact_damping * scaled[i]

@@ -53,10 +53,13 @@ def stop_late_target(clock: Record, target: Record, kept: int, arm: Record, dyna
     if clock.target_late != 0 or clock.target_age * params.dt <= params.target_timeout_s:
         return
     clock.target_late, coasts = 1, stack_vector(6)
-    for i in range(6):
-        held = target.K_task[i] > 0.0  # what was let go has no place to come to
-        coasts[i] = dynamics.velocity[i] * target.D_task[i] / target.K_task[i] if held else 0.0
     error = task_error(target.position, target.quat, dynamics.position, dynamics.rotation)
+    for i in range(6):
+        if target.K_task[i] > 0.0:
+            velocity = dynamics.velocity[i] + dynamics.carried_velocity[i]
+            coasts[i] = velocity * target.D_task[i] / target.K_task[i]
+        else:  # what was let go has no place to come to
+            coasts[i], error[i] = 0.0, 0.0
     if dot(error[:3], error[:3]) > dot(coasts[:3], coasts[:3]):
         target.position[:] = dynamics.position
         target.position += coasts[:3]

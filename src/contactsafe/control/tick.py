@@ -17,7 +17,7 @@ from contactsafe.control.codes import (
     MISSING,
     NO_TORQUE,
 )
-from contactsafe.control.detection import GONE_TICKS
+from contactsafe.control.detection import GONE_S
 from contactsafe.control.estimation import (
     estimate,
     follow_arm,
@@ -180,7 +180,7 @@ def _contact_law(
     if state.mode == COMPLY:
         # After the bound, or the task would use up what the brake frees.
         rate = c.params.limits.braking_rate - impedance.task_damping
-        gone = state.detection.quiet_ticks > GONE_TICKS
+        gone = state.detection.quiet_ticks * c.params.clock.dt > GONE_S
         reaction.damp_approach(
             tau, direction, qd, gone, c.dynamics.M, impedance.joint_damping, rate, params.approach_damping
         )

@@ -121,6 +121,8 @@ def _stay(c: Record) -> None:
     target, out = c.target, c.output
     for i in range(6):
         damping = _HELD_DAMPING[0] if i < 3 else _HELD_DAMPING[1]
+        if target.K_task[i] == 0.0:  # a direction that was let go is held as well
+            target.K_task[i] = 0.25 * damping * damping
         target.D_task[i] = max(target.D_task[i], damping)
         if i < 3:
             target.position[i] = out.position[i] + out.velocity[i] / target.D_task[i]

@@ -61,8 +61,7 @@ class Arm(Independent):
         calibrated: whether it is as it was identified; see `contactsafe.robots.calibrated`.
         lever_doubted: lever arm at which a point of the surface is hardly believed to be a contact, m: of points that
             explain a torque alike, the one that takes less force is. 0 to go by the torque's direction alone.
-
-        base: where the body that carries the first joint stands in `model`; None for what the model says.
+        base: where the body stands in `model` in which the first joint's axis is fixed; None for what the model says.
 
     Raises:
         InvalidInputError: gravity, the model, a limit, friction, drag or home is not finite or not one row a joint, a

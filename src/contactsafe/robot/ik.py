@@ -32,6 +32,7 @@ try:
 except ImportError:  # no wheel for this platform: the compiled solver serves alone
     TracIK = None
 
+_FEW_SEEDS = 6  # of them that an arm of fewer joints tries for the posture of a pose
 _SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
 
@@ -97,6 +98,10 @@ class InverseKinematics(Independent):
             InvalidInputError: as `posture`.
             UnreachableError: neither finds any.
         """
+        if self._few:
+            q, error = self._from_seed(*_checked_pose(pose), np.asarray(q_seed, dtype=float))
+            if self._reached(error):
+                return q
         try:
             return self.posture(pose)
         except UnreachableError:
@@ -139,7 +144,8 @@ class InverseKinematics(Independent):
             q, error = self._from_seed(position, quat, seed)
             if self._reached(error):
                 return q
-            nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + e[1] / ROTATION_TOLERANCE)
+            turn = 0.0 if self._few else 1.0 / ROTATION_TOLERANCE
+            nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + turn * e[1])
         if not self._few and self._reference is not None:
             found = self._reference.ik(position, quat_to_matrix(quat), (*near, self._arm.home)[0])
             if found is not None:
@@ -166,7 +172,7 @@ class InverseKinematics(Independent):
         """Search from home turned towards the position, then from the fixed seeds."""
         towards = np.array(self._rule.home)
         turn_towards(self._rule, position, towards)
-        for seed in (towards, *self._seeds):
+        for seed in (towards, *self._seeds[:_FEW_SEEDS]):
             q, error = self._from_seed(position, quat, seed)
             if self._reached(error):
                 return q, True

@@ -44,7 +44,7 @@ class NominalModel(Independent):
         self, model: mujoco.MjModel, site: str, surface: np.ndarray, places: np.ndarray, base: Frame | None = None
     ):
         self._model, self._own = model, False
-        self._base = _base_frame(model) if base is None else base
+        self._base, self._at = base, np.zeros(3)
         self._site, self._surface = site, np.ascontiguousarray(surface, dtype=float)
         self._places = np.ascontiguousarray(places, dtype=float)
         self._twist, self._acceleration = np.zeros(6), np.zeros(3)
@@ -68,20 +68,20 @@ class NominalModel(Independent):
         """
         if not self._own:
             self._model, self._own = copy.deepcopy(self._model), True
-            self._stands = _standing(self._model)
-            self._gravity = self._model.opt.gravity.copy()
+            self._stands, self._gravity = _standing(self._model), self._model.opt.gravity.copy()
+            self._from = (_base_frame(self._model) if self._base is None else self._base).inverse()
             self._bind()
-        moved = base.of(self._base.inverse())
+        moved = base.of(self._from)
         for body, stands in self._stands.items():
             frame = moved.of(stands)
             self._model.body_pos[body], self._model.body_quat[body] = frame.position, matrix_to_quat(frame.rotation)
-        self._twist, self._acceleration = twist, acceleration
+        self._at, self._twist, self._acceleration = base.position, twist, acceleration
         self._model.opt.gravity[:] = self._gravity - acceleration
-        self.handle["base_position"] = base.position
         self._move()
         return moved
 
     def _move(self) -> None:
+        self.handle["base_position"] = self._at
         self.handle["base_twist"], self.handle["base_acceleration"] = self._twist, self._acceleration
         self.handle["gravity"] = self._model.opt.gravity
 

@@ -70,7 +70,7 @@ def note_unserved(
     if free:
         findings.note(
             f"{several(model, JOINT, free, 'lets', 'let')} the base move, which is taken to stand still; bolt it down, "
-            "or what moves it is felt as a contact"
+            "or tell set_base how it moves, or what moves it is felt as a contact"
         )
     sprung = [joint for joint in chain if model.jnt_stiffness[joint] != 0.0]
     if sprung:

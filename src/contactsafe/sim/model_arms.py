@@ -12,6 +12,7 @@ from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
+from contactsafe.robot.ik_few_joints import FEW, solve_position_first
 from contactsafe.robot.spec_parts import Flange, linear, read_spec
 from contactsafe.robot.tool_point import find_tool
 from contactsafe.robot.user_home import key_frame
@@ -21,6 +22,9 @@ MOVES_M = 0.1
 
 _STUCK = 1e6
 """Damping of joints that are not the arm's, N m s/rad or N s/m: they stay where they are."""
+
+_TURNED_RAD = 1e-2
+"""A tool that is turned by less is not turned."""
 
 _MARGIN_RAD = 0.25
 """Room to the ends of the joints' range beyond which more makes no move better, rad."""
@@ -114,15 +118,16 @@ def _choose_move(arm: Arm) -> tuple[np.ndarray, np.ndarray]:
     """Return where the tool goes, 10 cm along an axis of the world where the joints allow it, and the joints there."""
     start, nominal, q = arm.tool_pose(arm.home), arm.nominal(), np.empty(arm.n)
     best = (0.0, np.zeros(3), arm.home.copy())
+    search, turned = (solve_position_first, np.inf) if arm.n < FEW else (solve_ik, _TURNED_RAD)
     for move in MOVES_M * np.concatenate([np.eye(3), -np.eye(3)]):
         seed = arm.home.copy()
         for fraction in np.linspace(0.2, 1.0, 5):
-            error, turn = solve_ik(
+            error, turn = search(
                 nominal.handle, start.position + fraction * move, start.quat, seed, arm.q_min, arm.q_max, q
             )
             seed = q.copy()
         room = float(np.minimum(q - arm.q_min, arm.q_max - q).min())
-        if error < POSITION_TOLERANCE and turn < 1e-2 and min(room, _MARGIN_RAD) > best[0]:
+        if error < POSITION_TOLERANCE and turn < turned and min(room, _MARGIN_RAD) > best[0]:
             best = (min(room, _MARGIN_RAD), move, q.copy())
     return best[1], best[2]
 

@@ -19,6 +19,7 @@ from contactsafe.robot.arm import Arm, Pose
 from contactsafe.robot.calibrated import arm_for
 from contactsafe.robot.calibration import Calibration
 from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.ik_few_joints import FEW
 from contactsafe.robot.posture import posture_rule
 from contactsafe.robot.soundness import array_of
 from contactsafe.sim.backend import Backend
@@ -198,7 +199,10 @@ class Tasks(Independent):
             UnreachableError: there are none.
         """
         try:
-            return self._ik.solve(pose)
+            q = self._ik.solve(pose)
+            if self.arm.n < FEW and np.abs(self.arm.tool_pose(q).quat @ pose.quat) < _UPRIGHT:
+                raise UnreachableError("the position alone is reached")
+            return q
         except UnreachableError:
             where = ", ".join(f"{x:.3f}" for x in pose.position)
             raise UnreachableError(
@@ -305,6 +309,9 @@ class Tasks(Independent):
         """Make one task alike to warm up with."""
         return type(self)(self.config, 1, arm=self.arm, backend=self._backend)
 
+
+_UPRIGHT = 0.99996
+"""Cosine of half the angle, 1°, by which a tool may be turned from what a task needs."""
 
 _WARM: set[tuple[Any, ...]] = set()
 """Kinds of tasks whose step this process has compiled or loaded."""
