@@ -140,7 +140,7 @@ def test_a_wish_to_stop_is_followed_at_once_by_its_name(door):
 
 def test_a_direction_that_the_policy_let_go_is_held_when_it_falls_silent(door):
     stiffness = np.array([150.0, 0.0, 150.0, 150.0, 150.0, 0.0])
-    assert door.hand_in(100, K_task=stiffness) == states.NONE
+    assert door.hand_in(100, of_tick=100, K_task=stiffness) == states.NONE
     assert door.follow(100 + OLD_TICKS + 1)[0] == states.HELD
     assert (door.target["K_task"] >= 150.0).all()
 

@@ -282,9 +282,9 @@ class Controller(Instance):
             posture = self._ik.posture_near(wanted, record["q_posture"].copy())
         else:
             posture = in_range(self.arm, self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
-        if self.arm.n < FEW:  # it is asked for no rotation that it cannot have there
-            there = posture if target.posture is None else self._ik.solve(wanted, posture)
-            quat = matrix_to_quat(_dynamics(self._nominal, there, np.zeros(self.arm.n))["rotation"])
+        if self.arm.n < FEW:  # it is asked for no rotation that it cannot have there; a posture is where to look
+            posture = posture if target.posture is None else self._ik.solve(wanted, posture)
+            quat = matrix_to_quat(_dynamics(self._nominal, posture, np.zeros(self.arm.n))["rotation"])
         record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping
         self._last_numbers = numbers

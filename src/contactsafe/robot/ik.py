@@ -144,8 +144,7 @@ class InverseKinematics(Independent):
             q, error = self._from_seed(position, quat, seed)
             if self._reached(error):
                 return q
-            turn = 0.0 if self._few else 1.0 / ROTATION_TOLERANCE
-            nearest = min(nearest, error, key=lambda e: e[0] / POSITION_TOLERANCE + turn * e[1])
+            nearest = min(nearest, error, key=self._size)
         if not self._few and self._reference is not None:
             found = self._reference.ik(position, quat_to_matrix(quat), (*near, self._arm.home)[0])
             if found is not None:
@@ -185,6 +184,10 @@ class InverseKinematics(Independent):
 
     def _reached(self, error: tuple[float, float]) -> bool:
         return error[0] <= POSITION_TOLERANCE and (self._few or error[1] <= ROTATION_TOLERANCE)
+
+    def _size(self, error: tuple[float, float]) -> float:
+        """Return how large a pose error is in what counts of it."""
+        return error[0] / POSITION_TOLERANCE + (0.0 if self._few else error[1] / ROTATION_TOLERANCE)
 
     def _words(self, position_error_m: float, rotation_error_rad: float) -> str:
         """Write for a message what of a pose error counts."""
