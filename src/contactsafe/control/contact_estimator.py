@@ -23,9 +23,7 @@ _BELIEVED = 10.0
 
 
 class ContactEstimator(Instance):
-    """Feels what touches an arm, with the compiled stages that the controller runs, and drives nothing.
-
-    A copy, pickled or not, goes on by itself from where this one is.
+    """Feels what touches an arm, with the compiled stages that the controller runs; a copy goes on by itself.
 
     Args:
         arm: `contactsafe.robots.panda()` or another.

@@ -70,7 +70,7 @@ class Controller(Instance):
         config = checked_config(config)
         _warm_up(arm, config)
         self._ik = InverseKinematics(arm)
-        self._loaded, self._base = arm, MovingBase()
+        self._base = MovingBase()
         super().__init__(arm, config, records, index)
         self._last_numbers: list = []
 
@@ -167,7 +167,7 @@ class Controller(Instance):
         refuse_overload(load, loaded, *(_dynamics(known, q, still)["g"] for known in (nominal, self._nominal)))
         gravity, rotation = self.record["handle"]["gravity"], self.record["dynamics"]["rotation"]
         weight = payload_weight_into(self._records["payload"][self._index], rotation, gravity, np.zeros(6))
-        self._loaded, self._nominal = loaded, nominal
+        self._nominal = nominal
         self._place()
         known = self.record["payload"]
         known["mass"], known["com"], known["inertia"] = load

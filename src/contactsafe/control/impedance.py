@@ -44,13 +44,7 @@ _LEAST_STIFFNESS = 10.0
 
 @compiled
 def passive_step(
-    K: Vector,
-    D: Vector,
-    K_wanted: Vector,
-    D_wanted: Vector,
-    dt: float,
-    damping_min: float,
-    limited: bool,
+    K: Vector, D: Vector, K_wanted: Vector, D_wanted: Vector, dt: float, damping_min: float, limited: bool
 ) -> None:
     """Move stiffness and damping in place towards what is wanted, no faster than keeps the impedance stable.
 

@@ -86,14 +86,7 @@ def compensate_disturbance(J: Matrix, J_bar: Matrix, arm_torque: Vector, out: Ve
 
 @inlined
 def damp_approach(
-    tau: Vector,
-    direction: Vector,
-    qd: Vector,
-    gone: bool,
-    M: Matrix,
-    joint_damping: Vector,
-    rate: float,
-    damping: float,
+    tau: Vector, direction: Vector, qd: Vector, gone: bool, M: Matrix, damped: Vector, rate: float, damping: float
 ) -> None:
     """Brake motion into an obstacle in place, −d min(a · q̇, 0) a, no more than the sampled loop takes.
 
@@ -105,13 +98,13 @@ def damp_approach(
         qd: (n,), rad/s.
         gone: whether nothing has pressed for a while.
         M: joint inertia, (n, n), kg m².
-        joint_damping: that acts already, (n,), N m s/rad.
+        damped: damping of the joints that acts already, (n,), N m s/rad.
         rate: largest damping per inertia of all of it, 1/s.
         damping: d, N m s/rad.
     """
     speed = dot(direction, qd)
     if damping > 0.0 and (speed < 0.0 or gone):
-        d = min(damping, braking_limit(direction, M, joint_damping, rate))
+        d = min(damping, braking_limit(direction, M, damped, rate))
         for i in range(tau.shape[0]):
             tau[i] -= d * speed * direction[i]
 
@@ -138,12 +131,17 @@ def damp_contact(
         scaled[i] = scale[i] * qd[i]
     matvec_t_into(N_t, scaled, in_null)
     matvec_t_into(N_ct, scaled, beside_contact)
+    if mode == REJECT:
+        _keep_out_of_task(N_t, qd, scale, scaled)
     for i in range(n):
         damping[i] -= params.null_damping * (in_null[i] - beside_contact[i])
-    if mode == REJECT:  # −N_tᵀ d N_t q̇: the projector is oblique, and only so nothing of the task's motion drives it
-        matvec_into(N_t, qd, beside_contact)
-        for i in range(n):
-            beside_contact[i] *= scale[i]
-        matvec_t_into(N_t, beside_contact, scaled)
-    for i in range(n):
         damping[i] -= params.contact_damping * scaled[i]
+
+
+@inlined
+def _keep_out_of_task(N_t: Matrix, qd: Vector, scale: Vector, out: Vector) -> None:
+    """Fill N_tᵀ S N_t q̇, (n,): the projector is oblique, and only so nothing of the task's motion drives it."""
+    in_null = matvec_into(N_t, qd, stack_vector(qd.shape[0]))
+    for i in range(qd.shape[0]):
+        in_null[i] *= scale[i]
+    matvec_t_into(N_t, in_null, out)

@@ -144,14 +144,7 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
 
 @inlined
 def _contact_law(
-    c: Record,
-    elastic: Vector,
-    damping: Vector,
-    compensation: Vector,
-    N_t: Matrix,
-    N_ct: Matrix,
-    scale: float,
-    reason: int,
+    c: Record, elastic: Vector, damping: Vector, compensation: Vector, N_t: Matrix, N_ct: Matrix, scale: float, why: int
 ) -> Vector:
     """Bound the commanded contact force: compensation, on an obstacle the task, last the rest; then damp the approach.
 
@@ -159,7 +152,7 @@ def _contact_law(
         c: `controller_dtype` record.
         elastic, damping, compensation: torques of the impedance and of (18), (n,), N m; the latter two are changed.
         N_t, N_ct: null-space projectors of the task, and of task and contact, (n, n).
-        scale, reason: task scale that the tool allows.
+        scale, why: task scale that the tool allows, and its reason.
 
     Returns:
         Command less c and g, (n,), N m.
@@ -172,8 +165,8 @@ def _contact_law(
     left = limit - max(min(compensated, limit), 0.0)
     asked = torque_against_contact(direction, M_inv, elastic)
     if state.mode == COMPLY:
-        scale, reason = contact_bound.scale_of_task(asked, left, scale, reason)
-    contact_bound.follow_task_scale(state.reaction, state.mode, scale, reason, state.step)
+        scale, why = contact_bound.scale_of_task(asked, left, scale, why)
+    contact_bound.follow_task_scale(state.reaction, state.mode, scale, why, state.step)
     tau = state.reaction.task_scale * elastic + compensation + damping - state.link_masses.gravity_correction
     c.output.contact_command_nm, c.output.contact_limit_nm = compensated + asked, limit
     contact_bound.remove_excess(tau, direction, M_inv, limit)
