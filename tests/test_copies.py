@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 import contactsafe as cs
+from contactsafe.control.moving_base import MovingBase
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.copying import OfTraining, Threads, Unique
 from contactsafe.core.errors import InvalidInputError
@@ -205,6 +206,15 @@ def compute(threads):
     return [threads.submit(np.square, k).result() for k in range(4)]
 
 
+def carry(base):
+    """Move on by what was told before: the velocities tell the acceleration."""
+    nominal = cs.robots.panda().nominal()
+    base.pass_time(0.001)
+    base.tell(cs.Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])), base._twist + 0.1, None)
+    base.place(nominal)
+    return [nominal.handle["gravity"].copy(), nominal.handle["base_twist"].copy()]
+
+
 def find(findings):
     findings.problem(f"no joint {len(findings._problems)}")
     with pytest.raises(InvalidInputError) as caught:
@@ -371,6 +381,7 @@ ACTORS = {
     "InsertionEpisodes": (begun(lambda: Insertion().episodes("safe", [0, 1]), run_episodes), run_episodes),
     "Wiping": (Wiping, lambda task: [np.array(task.stage.corners)]),
     "WipingEpisodes": (begun(lambda: Wiping().episodes("safe", [0, 1]), run_episodes), run_episodes),
+    "MovingBase": (begun(MovingBase, carry), carry),
     "Findings": (begun(Findings, find), find),
     "Plotter": (plotter, lambda p: [p._count]),
 }

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contactsafe.core.copying import Independent
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.rotation import matrix_to_quat, quat_to_matrix
 from contactsafe.robot.arm import Pose, finite_array, unit_quaternion
@@ -17,7 +18,7 @@ _ELSEWHERE = 1e-3
 """A base that has moved by this, m or rad, has the posture of a target found anew."""
 
 
-class MovingBase:
+class MovingBase(Independent):
     """Where the base is, and how it moves.
 
     Attributes:
