@@ -48,11 +48,23 @@ def test_arm_that_ran_into_a_spring_yields(panda, stiffness):
         forces.append(spring_force(plant))
     assert any(contact.in_contact for contact in contacts)
     assert not any(contact.kind == "push" for contact in contacts)
-    limit = SAFE.reaction.contact_force_limit_comply_n
-    assert np.mean(forces[-300:]) == pytest.approx(limit, rel=0.4)  # the lever arm is a guess
+    assert np.mean(forces[-300:]) < 4.0
 
 
-@pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), (20000.0, 0.3)])
+TURNED = pytest.mark.xfail(strict=True, reason="the angle between contact and direction: 1.6 N m, 1.3 are allowed")
+OVER = pytest.mark.xfail(
+    strict=True, reason="a lever arm that is guessed too long: 3.0 and 3.3 N where 2.5 are allowed"
+)
+
+
+@OVER
+@pytest.mark.parametrize("stiffness", [2000.0, 20000.0])
+def test_arm_that_ran_into_a_spring_leaves_it_with_the_force_allowed(panda, stiffness):
+    forces = [spring_force(plant) for _, _, plant in collision(panda, stiffness, seconds=4.0)]
+    assert np.mean(forces[-300:]) == pytest.approx(SAFE.reaction.contact_force_limit_comply_n, rel=0.1)
+
+
+@pytest.mark.parametrize(("stiffness", "off"), [(2000.0, 0.03), pytest.param(20000.0, 0.12, marks=TURNED)])
 def test_steady_torque_of_an_obstacle_is_the_bound_in_force(panda, stiffness, off):
     """But for the angle between the contact's torque and the direction that was found for it."""
     *_, (_, controller, plant) = collision(panda, stiffness, seconds=4.0)
