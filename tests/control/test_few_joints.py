@@ -9,7 +9,7 @@ from tests.robot.worlds import OWN_SCENE
 from contactsafe import Measurement, Pose, Target, presets, robots
 from contactsafe.core.errors import UnreachableError
 from contactsafe.core.rotation import orientation_error, quat_to_matrix
-from contactsafe.robot.ik import InverseKinematics
+from contactsafe.robot.ik import InverseKinematics, finite_range
 from contactsafe.robot.posture import POSITION_TOLERANCE
 
 K = np.array([200.0] * 3 + [300.0] * 3)
@@ -58,6 +58,20 @@ def test_of_the_orientations_at_the_position_the_nearest_is_taken(arm):
         beside = arm.tool_pose(q + rng.choice([0.1, 0.3]) * rng.normal(size=arm.n))
         other = ik.solve(Pose(asked.position, beside.quat), q)
         assert turned(arm, arm.tool_pose(other), asked.quat) > nearest - 0.003
+
+
+def test_an_orientation_that_the_arm_has_was_missed_by_half_a_radian(arm):
+    """A pose that it can have in full: nearly always found, whichever joints it was made by."""
+    ik, rng = InverseKinematics(arm), np.random.default_rng(3)
+    low, high = finite_range(arm.q_min, arm.q_max)
+    off = []
+    for _ in range(100):
+        pose = arm.tool_pose(rng.uniform(0.9 * low, 0.9 * high))
+        try:
+            off.append(turned(arm, arm.tool_pose(ik.posture(pose)), pose.quat))
+        except UnreachableError:
+            off.append(np.inf)
+    assert np.mean(np.array(off) < 0.01) > 0.9
 
 
 def test_a_posture_that_was_given_does_not_turn_the_tool(arm):

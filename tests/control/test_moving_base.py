@@ -135,8 +135,17 @@ def test_velocities_tell_the_acceleration_and_a_reset_forgets_it(panda):
         controller.step(Measurement(panda.home, np.zeros(7), UNTOUCHED))
     assert_allclose(controller.record["handle"]["gravity"], [-2.0, 0.0, -9.81], atol=0.05)
     controller.reset(panda.home)
+    assert_allclose(controller.record["handle"]["gravity"], [0.0, 0.0, -9.81], atol=1e-9)
     controller.set_base(HOME_POSE, np.zeros(6))
     assert_allclose(controller.record["handle"]["gravity"], [0.0, 0.0, -9.81], atol=1e-9)
+
+
+def test_a_reset_lost_the_acceleration_that_was_told_at_the_next_payload(panda):
+    controller = Controller(panda)
+    controller.set_base(HOME_POSE, np.zeros(6), np.array([0.0, 0.0, 2.0]))
+    controller.reset(panda.home)
+    controller.set_payload(0.2)
+    assert_allclose(controller.record["handle"]["gravity"], [0.0, 0.0, -11.81], atol=1e-9)
 
 
 @pytest.mark.parametrize(

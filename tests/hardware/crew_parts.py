@@ -6,14 +6,16 @@ import time
 
 import numpy as np
 
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import publish, receive
 from contactsafe.hardware.messages import as_words, message_dtype, seen_dtype
-from contactsafe.hardware.states import RUNNING, STOPPED, TIME_UP
+from contactsafe.hardware.states import POLICY_DEAD, RUNNING, STOPPED, TIME_UP
 
 
 def control(path):
     """Tick a thousand times a second until the run is to end."""
+    ignore_terminal()
     exchange = Exchange(path)
     status = exchange.status
     while not status["go"][0] and not status["finished"][0]:
@@ -31,6 +33,7 @@ def control(path):
 
 def policy(path):
     """Be ready, and end with the run."""
+    ignore_terminal()
     exchange = Exchange(path)
     exchange.status["beat_policy"] += 1
     while not exchange.status["finished"][0]:
@@ -39,6 +42,7 @@ def policy(path):
 
 def dog(path):
     """Beat until the run is over."""
+    ignore_terminal()
     exchange = Exchange(path)
     while not exchange.status["finished"][0]:
         exchange.status["beat_watchdog"] += 1
@@ -48,6 +52,19 @@ def dog(path):
 def fails(path):
     """End before anything was ready."""
     del path
+
+
+def stops(path):
+    """End before anything was ready, because somebody asks to stop."""
+    exchange = Exchange(path)
+    while not exchange.status["stop"][0]:
+        time.sleep(0.001)
+
+
+def asks_to_stop(path):
+    """Fail to get ready: ask to stop, and end a little later."""
+    Exchange(path).ask_to_stop(POLICY_DEAD)
+    time.sleep(0.3)
 
 
 def stays(path):

@@ -126,6 +126,28 @@ def test_a_good_target_ends_the_hold_and_none_ends_a_stop(door):
     assert door.follow(400)[0] == states.STOPPING
 
 
+@pytest.mark.parametrize("state", [states.STOPPING, states.FAULT])
+def test_an_arm_that_was_to_come_to_rest_followed_the_policy_and_whoever_pushed_it(door, state):
+    door.hand_in(100, of_tick=100)
+    door.gate["state"] = state
+    door.follow(101)
+    held = door.target.copy()
+    door.controller.record["output"]["position"] += 0.05  # pushed
+    for k in range(5):
+        door.hand_in(102 + k, number=2 + k, of_tick=101 + k, position=(0.9, 0.9, 0.9), K_task=10.0)
+        door.follow(102 + k)
+    assert np.array_equal(door.target["position"], held["position"])
+    assert np.array_equal(door.target["K_task"], held["K_task"])
+    assert door.gate["refused"] == 0
+
+
+def test_a_reading_that_is_no_number_is_no_posture_to_hold(door):
+    door.hand_in(100, of_tick=100)
+    door.controller.record["measurement"]["q"][2] = np.nan
+    door.follow(100 + OLD_TICKS + 1)
+    assert np.isfinite(door.target["q_posture"]).all()
+
+
 def test_the_reason_of_a_hold_is_why_targets_are_refused(door):
     door.hand_in(100, of_tick=100)
     door.hand_in(120, number=2, of_tick=119, position=(np.nan, 0.0, 0.0))

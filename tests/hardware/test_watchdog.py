@@ -96,6 +96,30 @@ def test_a_control_loop_that_stands_still_is_told_from_a_robot_that_is_silent(sc
     assert scene.stop == reason
 
 
+@pytest.mark.parametrize("state", [states.STOPPING, states.FAULT])
+def test_a_control_loop_that_hung_as_it_braked_hung_for_ever(scene, state):
+    scene.look()
+    scene.exchange.status["state"] = state
+    scene.beats.remove("beat_control")
+    scene.look()
+    scene.look(0.15)
+    assert scene.stop == states.CONTROL_STUCK
+    scene.look(6.0)
+    assert scene.processes["control"].wait(5.0) == -signal.SIGKILL
+
+
+def test_the_time_that_it_took_to_begin_is_no_silence(scene):
+    """Between getting ready and the first turn the loop does not beat; it does before it says that it runs."""
+    scene.exchange.status["state"] = states.IDLE
+    scene.beats.remove("beat_control")
+    scene.look()
+    scene.look(2.0)
+    scene.exchange.status["beat_control"] += 1
+    scene.exchange.status["state"] = states.RUNNING
+    scene.look()
+    assert scene.stop == 0
+
+
 def test_in_lockstep_nothing_is_too_slow(scene):
     scene.exchange.status["lockstep"] = 1
     scene.look()

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from contactsafe.core.rotation import quat_multiply, rotvec_to_quat
 from contactsafe.hardware import states
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import publish, receive
@@ -103,6 +104,20 @@ def test_at_a_fifth_of_the_speed_it_takes_five_times_as_long(stage):
             one.step()
     gone = [math.dist(one.path[0], one.path[-1]) for one in (slow, fast)]
     assert gone[0] == pytest.approx(0.2 * gone[1])
+
+
+def test_a_hand_that_was_tilted_was_told_to_point_down_at_once(stage):
+    one = stage(speed=0.4)
+    down = one.work.start.quat
+    one.actor.seen[0]["target"]["quat"] = quat_multiply(rotvec_to_quat(np.array([0.6, 0.0, 0.0])), down)
+    before, turned = one.actor.seen[0]["target"]["quat"].copy(), []
+    while one.actor.steps < 0:
+        one.step()
+        quat = one.message[0]["quat"].copy()
+        turned.append(2.0 * math.acos(min(1.0, abs(float(quat @ before)))))
+        before = quat
+    assert max(turned[:-1]) < 0.4 * 0.5 / 60.0 + 1e-6  # the last step is the policy's own
+    assert sum(turned[:-1]) == pytest.approx(0.6, abs=1e-3)
 
 
 def test_from_below_it_goes_up_first(stage):

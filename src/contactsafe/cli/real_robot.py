@@ -13,6 +13,7 @@ from contactsafe.policy.work import Work
 from contactsafe.robot.arm import Arm
 
 _NEAR_LIMIT_RAD = 0.05
+_LESS_SAFE = ": it takes no notice of what touches the arm; for comparison, with nobody near"
 _MODES = {0: "other", 1: "idle", 2: "moving", 3: "guiding", 4: "reflex", 5: "stopped by the user", 6: "recovering"}
 _NOT_READY = {
     2: "end the program that moves it",
@@ -73,13 +74,14 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
         raise InvalidInputError(f"the robot is not ready: {_MODES[mode]}; {_NOT_READY[mode]}")
     load, start, tool = load_of(arm), work.start.position, arm.tool_pose(q).position
     weight = "as in its own settings" if load is None else f"{load[0]:.2f} kg beyond the hand, told to the robot"
-    state = _MODES.get(mode, "other")
+    state, up = _MODES.get(mode, "other"), "up, " if tool[2] < start[2] else ""
     lines = [
         f"robot        {asked.robot}, {state}; joints at least {margin.min():.2f} rad from their limits",
         f"tool         {arm.tool.name if arm.tool else 'none'}, {weight}; now at {_words(tool)} m",
-        f"first move   up, aside and down to {_words(start)} m: is that path free?",
+        f"first move   {up}aside, turning down, and down to {_words(start)} m: is that path free?",
         f"workspace    about {_words(np.array(work.centre))} m: does what is worked on stand there, level?",
         *_camera_lines(asked),
+        f"controller   {asked.controller}{_LESS_SAFE if asked.controller == 'vices' else ''}",
         f"speed        {asked.speed:g} of the policy's own; begin with --speed 0.2",
         f"collisions   the robot stops by itself beyond {COLLISION_NM:g} N m and {COLLISION_N:g} N: raised, since the "
         "controller keeps contacts gentle by itself, and an impact is short",

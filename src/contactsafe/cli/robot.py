@@ -1,5 +1,6 @@
 """`contactsafe run`: a policy on a Franka, or on a simulated one over the robot's own network protocol."""
 
+import contextlib
 import shlex
 import sys
 import time
@@ -184,19 +185,17 @@ def _simulated(asked: Options, task: Any, arm: Arm, bundle: Path, controller: st
     folder = asked.out / controller.replace(":", "-")
     folder.mkdir(parents=True, exist_ok=True)
     exchange = Exchange.create(arm.n)
-    exchange.status["lockstep"] = asked.lockstep
-    simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone, **looks)
-    robot = SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH)
-    try:
-        with robot:
+    with contextlib.ExitStack() as left:
+        left.callback(exchange.unlink)
+        exchange.status["lockstep"] = asked.lockstep
+        simulated = task.simulated(arm, exchange.path, asked.seed, asked.rounds, not asked.alone, **looks)
+        left.callback(simulated.close)
+        with SimulatedRobot(simulated.scene, arm.home, asked.lockstep, simulated.effect, folder / TRUTH) as robot:
             said = said_of(asked, controller) | {"seed": str(asked.seed)}
             parts = parts_of(asked, arm, bundle, simulated.work, controller, robot.address, folder / LOG, said)
             ending = run_crew(exchange, parts, asked.seconds, StatusLine())
         truth = np.load(folder / TRUTH)
         return RobotRun(controller, truth, ending, simulated.figures(truth), bool(simulated.scene.pushes))
-    finally:
-        exchange.unlink()
-        simulated.close()
 
 
 def said_of(asked: Options, controller: str) -> dict[str, str]:

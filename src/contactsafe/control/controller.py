@@ -104,6 +104,8 @@ class Controller(Instance):
         q = in_range(self.arm, self.arm.joint_vector(q, "q"), "q", RANGE_TOLERANCE)
         qd = self.arm.joint_vector(np.zeros(self.arm.n) if qd is None else qd, "qd")
         qd = believable(qd, self.record["params"]["arm"]["qd_most"])
+        self._base.forget_motion()
+        self._place()
         dynamics = _dynamics(self._nominal, q, qd)
         tau = self._last_torque(q, dynamics) if torque is None else within_limit(self.arm, torque)
         allowed = self.config.impedance.stiffness_range
@@ -111,7 +113,6 @@ class Controller(Instance):
         if stiffness is not None:
             held_by = checked_stiffness(stiffness, allowed)
         self.forget()
-        self._base.forget_motion()
         self.record["dynamics"] = dynamics
         state = self.record["state"]
         state["command"]["tau"], state["clock"]["q_good"] = tau, q
@@ -243,7 +244,8 @@ class Controller(Instance):
 
         Raises:
             InvalidInputError: wrong shapes, numbers that are not finite, gains out of range.
-            UnreachableError: no posture was given and none was found for the pose.
+            UnreachableError: no posture was given and none was found for the pose; of fewer than six joints, none that
+                puts the tool there.
         """
         self.require_reset(measurement)
         self._kept[...] = target is None
@@ -283,7 +285,7 @@ class Controller(Instance):
         else:
             posture = in_range(self.arm, self.arm.joint_vector(target.posture, "posture"), "posture", OUTSIDE_RAD)
         if self.arm.n < FEW:  # it is asked for no rotation that it cannot have there; a posture is where to look
-            posture = posture if target.posture is None else self._ik.solve(wanted, posture)
+            posture = posture if target.posture is None else self._ik.posture_near(wanted, posture)
             quat = matrix_to_quat(_dynamics(self._nominal, posture, np.zeros(self.arm.n))["rotation"])
         record["position"], record["quat"], record["q_posture"] = position, quat, posture
         record["K_task"], record["D_task"] = stiffness, damping

@@ -29,6 +29,7 @@ class MovingBase(Independent):
         self.is_told = False
         self._base, self._twist, self._acceleration = Frame(np.zeros(3), np.eye(3)), np.zeros(6), np.zeros(3)
         self._before, self._passed_s = np.zeros(3), math.inf  # velocity told before, and time since
+        self._is_estimated = False  # the acceleration, from velocities
         self._model = self._postured = Frame(np.zeros(3), np.eye(3))  # the model's world: now, and at the last posture
 
     def pass_time(self, seconds: float) -> None:
@@ -36,8 +37,10 @@ class MovingBase(Independent):
         self._passed_s += seconds
 
     def forget_motion(self) -> None:
-        """Begin anew with what velocities tell of the acceleration: time has gone by."""
-        self._passed_s, self._acceleration = math.inf, np.zeros(3)
+        """Begin anew with what velocities tell of the acceleration: time has gone by. What was told stands."""
+        self._passed_s = math.inf
+        if self._is_estimated:
+            self._acceleration = np.zeros(3)
 
     def tell(self, pose: Pose, velocity: ArrayLike | None, acceleration: ArrayLike | None) -> None:
         """Take what `Controller.set_base` was given.
@@ -50,6 +53,7 @@ class MovingBase(Independent):
         position = finite_array(pose.position, (3,), "pose.position")
         rotation = quat_to_matrix(unit_quaternion(pose.quat, "pose.quat"))
         twist = finite_array(np.zeros(6) if velocity is None else velocity, (6,), "velocity")
+        self._is_estimated = acceleration is None
         if acceleration is not None:
             self._acceleration = finite_array(acceleration, (3,), "acceleration")
         elif velocity is None:

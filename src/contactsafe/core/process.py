@@ -15,6 +15,9 @@ from collections.abc import Callable
 from pathlib import PurePath
 
 _SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "terminated"}
+TERMINAL_SIGNALS = (signal.SIGINT, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+"""By which a terminal ends all processes of a command: Ctrl-C, and as it is closed."""
+
 _received: list[int] = []
 _told: list[int] = []
 
@@ -64,6 +67,12 @@ def run(command: Callable[[], int]) -> int:
         status = 128 + _received[0]
     _hear(_leave)
     return status
+
+
+def ignore_terminal() -> None:
+    """Go on where the terminal says to stop, or to wait: the command hears it too, and ends its processes in order."""
+    for number in (*TERMINAL_SIGNALS, *([signal.SIGTSTP] if hasattr(signal, "SIGTSTP") else [])):
+        signal.signal(number, signal.SIG_IGN)
 
 
 class _LostError(BaseException):

@@ -121,6 +121,7 @@ class ControlLoop(Unique):
         gc.freeze()
         gc.disable()
         port.begin()
+        status["beat_control"] += 1  # before: from RUNNING on the watchdog counts
         status["state"] = RUNNING
         try:
             self._cycle()

@@ -6,6 +6,7 @@ import time
 import traceback
 
 from contactsafe.core.errors import ContactSafeError
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware import realtime
 from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
 from contactsafe.hardware.exchange import Exchange
@@ -22,7 +23,7 @@ def control(exchange_path: str, settings: ControlSettings) -> None:
     """
     exchange = Exchange(exchange_path)
     status = exchange.status
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all processes: the command asks to stop
+    ignore_terminal()
     signal.signal(signal.SIGTERM, lambda *_: exchange.ask_to_stop(ASKED))
     status["pid_control"] = os.getpid()
     try:

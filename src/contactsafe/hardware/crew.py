@@ -4,7 +4,7 @@ import math
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from contactsafe.core.errors import ContactSafeError
+from contactsafe.core.process import TERMINAL_SIGNALS
 from contactsafe.hardware.ending import Ending, ending_of
 from contactsafe.hardware.exchange import Exchange
-from contactsafe.hardware.states import ASKED
+from contactsafe.hardware.states import ASKED, POLICY_DEAD
 
 _READY_S = 1800.0
 """The first run on a machine compiles for minutes."""
@@ -63,9 +64,11 @@ def run_crew(
     processes = {
         part.name: context.Process(target=part.target, args=(str(exchange.path), *part.arguments)) for part in parts
     }
+    started: list[BaseProcess] = []
     try:
         for process in processes.values():
             process.start()
+            started.append(process)
         _wait_until_ready(processes, exchange)
         status["last_tick"] = round(1000.0 * seconds) if math.isfinite(seconds) else 0
         status["go"] = 1
@@ -77,7 +80,8 @@ def run_crew(
                 time.sleep(_EVERY_S)
     finally:
         exchange.ask_to_stop(ASKED)
-        _see_off(processes, exchange)
+        _see_off(started, exchange)
+        exchange.unlink()
     return ending_of(exchange)
 
 
@@ -90,18 +94,20 @@ def _wait_until_ready(processes: Mapping[str, BaseProcess], exchange: Exchange) 
         gone = [name for name in processes if not processes[name].is_alive()]
         if gone or time.monotonic() > until:
             status["finished"] = 1
-            raise RunError(f"the {gone[0] if gone else awaited[0]} process did not get ready; it said why above")
+            first = "policy" if status["stop"][0] == POLICY_DEAD else (*gone, *awaited)[0]  # others end for its sake
+            raise RunError(f"the {first} process did not get ready; it said why above")
         time.sleep(_EVERY_S)
 
 
 @contextmanager
 def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
-    """Bring the arm to rest on Ctrl-C and SIGTERM, instead of dying of them."""
+    """Bring the arm to rest on Ctrl-C, SIGTERM, and where the terminal is closed, instead of dying of them."""
 
     def ask(*_: Any) -> None:
         exchange.ask_to_stop(ASKED)
 
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    heard = [n for n in (*TERMINAL_SIGNALS, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN]  # as of nohup
+    before = {number: signal.signal(number, ask) for number in heard}
     try:
         yield
     finally:
@@ -109,14 +115,13 @@ def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _see_off(processes: Mapping[str, BaseProcess], exchange: Exchange) -> None:
+def _see_off(processes: Sequence[BaseProcess], exchange: Exchange) -> None:
     """Wait for all to end; the watchdog ends whoever does not, and this does where there is none."""
     until = time.monotonic() + _SEE_OFF_S
-    while any(process.is_alive() for process in processes.values()) and time.monotonic() < until:
+    while any(process.is_alive() for process in processes) and time.monotonic() < until:
         exchange.status["beat_command"] += 1
         time.sleep(_EVERY_S)
-    for process in processes.values():
+    for process in processes:
         if process.is_alive():
             process.kill()
         process.join(1.0)
-    exchange.unlink()

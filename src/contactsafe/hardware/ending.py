@@ -1,5 +1,6 @@
 """How a run ended, and how it went until then."""
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,10 +52,29 @@ def ending_of(exchange: Exchange) -> Ending:
     state, reason = int(status["state"]), int(status["reason"])
     counts = np.cumsum(status["busy"])
     median, late, most = (int(np.searchsorted(counts, fraction * counts[-1])) for fraction in (0.5, 0.99, 1.0))
-    well = state == STOPPED and reason in WELL and status["recorder_errno"] == 0
+    ended_well, unwritten = state == STOPPED and reason in WELL, int(status["recorder_errno"])
+    remedies = [] if ended_well else [REASONS[reason].remedy]
+    if cut := _why_cut_short(status):
+        remedies.append(f"its log ends early: {cut}")
     return Ending(
-        STATES[state], REASONS[reason].name, "" if well else REASONS[reason].remedy, bool(well), int(status["tick"]),
+        STATES[state], REASONS[reason].name, "; ".join(remedies), ended_well and not cut, int(status["tick"]),
         int(status["refused"]), int(status["lost"]), float(status["first_step_nm"]), float(status["largest_step_nm"]),
-        (median, late, most, int(status["busy"][500:].sum())), int(status["recorded"]), int(status["recorder_errno"]),
+        (median, late, most, int(status["busy"][500:].sum())), _recorded(status), unwritten,
         tuple(int(part.sum()) for part in np.split(status["busy"], BUSY_EDGES_US[:-1])),
     )  # fmt: skip
+
+
+def _why_cut_short(status: np.void) -> str:
+    """Return why a log lacks the end of its run and what to do, empty where it does not."""
+    number = int(status["recorder_errno"])
+    if number > 0:
+        return f"{os.strerror(number)}; give it another place"
+    if number < 0:
+        return "see what the recorder said above"
+    died = status["pid_recorder"] != 0 and status["recorded"] < status["rows"]
+    return "the recorder was ended; see what ended it" if died else ""
+
+
+def _recorded(status: np.void) -> int:
+    """Return how many ticks are in the log: not where the run begins, nor what the recorder was too late for."""
+    return max(int(status["recorded"]) - int(status["dropped"]) - 1, 0)

@@ -65,7 +65,7 @@ def verdict(gate: Record, message: Record, tick: int, joints: int, impedance: Re
 
 @compiled
 def admit(gate: Record, message: Record, arrived: int, tick: int, c: Record) -> None:
-    """Hand a target that has arrived to the controller, or refuse it.
+    """Hand a target that has arrived to the controller, or refuse it; an arm that is to come to rest is told no more.
 
     Args:
         gate: `gate_dtype` record; advanced.
@@ -75,7 +75,8 @@ def admit(gate: Record, message: Record, arrived: int, tick: int, c: Record) -> 
         c: `controller_dtype` record; its target is replaced.
     """
     c.target.kept = 1
-    if arrived <= 0 or arrived == gate.sequence:
+    at_work = gate.state == RUNNING or gate.state == HELD
+    if not at_work or arrived <= 0 or arrived == gate.sequence:
         return
     gate.sequence = arrived
     gate.refusal = verdict(gate, message, tick, c.target.q_posture.shape[0], c.params.impedance)
@@ -127,4 +128,4 @@ def _stay(c: Record) -> None:
         if i < 3:
             target.position[i] = out.position[i] + out.velocity[i] / target.D_task[i]
     target.quat[:] = matrix_to_quat(out.rotation)
-    target.q_posture[:] = c.measurement.q
+    target.q_posture[:] = c.state.arm.q

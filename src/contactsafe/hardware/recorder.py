@@ -5,7 +5,6 @@ one behind the other in the file, and each write reaches the system at once.
 """
 
 import os
-import signal
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.run_log import CDR, RUN, STEPS_TOPIC, TICKS_TOPIC, ros_schema
 
@@ -105,7 +105,7 @@ class Recorder(Unique):
 
 def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     """Be the recorder of a run, until the control process has let go of the robot, or nobody is left."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_terminal()
     exchange = Exchange(exchange_path)
     status = exchange.status
     status["pid_recorder"] = os.getpid()

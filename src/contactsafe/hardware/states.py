@@ -37,11 +37,11 @@ REASONS = {
     WATCHDOG_SILENT: Reason("watchdog silent", "the watchdog has died; start anew"),
     COMMAND_DEAD: Reason("command ended", "the command that began the run has died; start it anew"),
     CONTROL_STUCK: Reason("control stuck", "the control loop stood still for 100 ms; give it a processor of its own"),
-    ROBOT_SILENT: Reason("robot silent", "no state for 100 ms; check cable, power and the robot's own interface"),
+    ROBOT_SILENT: Reason("robot silent", "no state for 300 ms; check cable, power and the robot's own interface"),
     ROBOT_FAULT: Reason("robot fault", "the robot has stopped by itself; see its error"),
-    BRAKED: Reason("braked", "measurements were lost or contradicted each other; see the controller's fault"),
+    BRAKED: Reason("braked", "measurements were lost or contradicted each other; see the fault in the log, start anew"),
     CONTROL_DEAD: Reason("control ended", "the control process has died, the robot holds itself; start anew"),
-    CAMERA_SILENT: Reason("camera silent", "no picture for 500 ms; plug the camera in again, and start anew"),
+    CAMERA_SILENT: Reason("camera silent", "nothing new for ten seconds; plug the camera in again, and start anew"),
     POLICY_DONE: Reason("done", "the policy has done its work"),
 }
 """By number, as in a log."""

@@ -6,6 +6,7 @@ import signal
 import time
 
 from contactsafe.core.copying import Unique
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.states import (
     COMMAND_DEAD,
@@ -16,6 +17,7 @@ from contactsafe.hardware.states import (
     POLICY_DEAD,
     ROBOT_SILENT,
     RUNNING,
+    STOPPING,
 )
 
 _EVERY_S = 0.01
@@ -91,10 +93,10 @@ class Watchdog(Unique):
                 self.exchange.ask_to_stop(CONTROL_DEAD)
                 status["state"], status["reason"], status["finished"] = FAULT, CONTROL_DEAD, 1
             return
-        silent = self._beats.silent_for("control", int(status["beat_control"][0]))
-        running = status["state"][0] in (RUNNING, HELD) and not status["lockstep"][0] and not status["finished"][0]
+        turns = status["state"][0] in (RUNNING, HELD, STOPPING, FAULT) and not status["lockstep"][0]
         waits = bool(status["waits_for_robot"][0])
-        if running and silent > (_SILENT_S if waits else _STUCK_S):
+        silent = self._beats.silent_for("control", int(status["beat_control"][0]))  # after: it beats before it turns
+        if turns and not status["finished"][0] and silent > (_SILENT_S if waits else _STUCK_S):
             self.exchange.ask_to_stop(ROBOT_SILENT if waits else CONTROL_STUCK)
 
     def _adopt(self) -> None:
@@ -133,7 +135,7 @@ def _is_zombie(pid: int) -> bool:
 
 def watch(exchange_path: str) -> None:
     """Be the watchdog of a run, until everybody else is gone; the last one out removes the shared memory."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_terminal()
     exchange = Exchange(exchange_path)
     exchange.status["pid_watchdog"] = os.getpid()
     dog = Watchdog(exchange)

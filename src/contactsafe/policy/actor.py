@@ -9,6 +9,7 @@ import numpy as np
 
 from contactsafe.control.records import controller_dtype
 from contactsafe.core.copying import Unique
+from contactsafe.core.rotation import quat_multiply, quat_to_rotvec, rotvec_to_quat
 from contactsafe.hardware.exchange import STEPS, Exchange
 from contactsafe.hardware.mailbox import publish, receive
 from contactsafe.hardware.messages import as_words, message_dtype, seen_dtype
@@ -23,6 +24,9 @@ from contactsafe.robot.arm import Arm
 from contactsafe.robot.posture import POSITION_TOLERANCE, find_posture, posture_rule
 
 _ARRIVED_M = 0.01
+
+_TURN_RAD_S = 0.5
+"""The tool is turned to where the work begins no faster than this."""
 
 _BLIND_STEPS = 600
 """Policy steps for which the arm waits for a camera that shows nothing new, ten seconds, before the run ends."""
@@ -129,7 +133,7 @@ class Actor(Unique):
         look_at(self.shadow, 0, self.pose, self.target)
 
     def _travel(self) -> bool:
-        """Move the target to the start, first up, then aside, then down; tell whether the tool has waited there."""
+        """Turn the target to the start and move it there: up, aside, down; tell whether it has waited there."""
         target, start = self.shadow[0]["target"], self.work.start
         path = start.position - target["position"]
         if path[2] > 0.0:
@@ -138,12 +142,13 @@ class Actor(Unique):
             path[2] = 0.0  # aside before down
         length, stride = float(np.linalg.norm(path)), self.work.travel_m_s * self.settings.speed / POLICY_RATE_HZ
         target["position"] += path * min(1.0, stride / max(length, 1e-9))
-        target["quat"], target["K_task"], target["D_task"] = start.quat, self.stiffness, self.damping
+        turn_left = _turn_towards(target["quat"], start.quat, _TURN_RAD_S * self.settings.speed / POLICY_RATE_HZ)
+        target["K_task"], target["D_task"] = self.stiffness, self.damping
         posture = np.empty(self.settings.arm.n)
         if find_posture(self.rule, target["position"], target["quat"], posture)[0] <= POSITION_TOLERANCE:
             target["q_posture"] = posture
         left = math.dist(target["position"], start.position)
-        arrived = left < 1e-6 and math.dist(self.seen[0]["position"], start.position) < _ARRIVED_M
+        arrived = left < 1e-6 and turn_left == 0.0 and math.dist(self.seen[0]["position"], start.position) < _ARRIVED_M
         self.waited = self.waited + 1 if arrived else 0
         return self.waited > _QUIET_STEPS
 
@@ -163,3 +168,14 @@ class Actor(Unique):
         row["pose"], row["force"], row["action"] = self.pose, self.seen[0]["force"], self.action
         status["steps_written"] += 1
         status["steps"] = step + 1
+
+
+def _turn_towards(quat: np.ndarray, goal: np.ndarray, most: float) -> float:
+    """Turn an orientation in place towards another, by an angle at most, rad; return what is left of it."""
+    turn = quat_to_rotvec(quat_multiply(goal, quat * [1.0, -1.0, -1.0, -1.0]))
+    angle = float(np.linalg.norm(turn))
+    if angle <= most:
+        quat[:] = goal
+        return 0.0
+    quat[:] = quat_multiply(rotvec_to_quat(turn * (most / angle)), quat)
+    return angle - most

@@ -1,10 +1,10 @@
 """The policy process of a real robot: sixty times a second it looks, decides, and tells control a target."""
 
 import os
-import signal
 import time
 
 from contactsafe.core.errors import ContactSafeError
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import receive
 from contactsafe.hardware.states import POLICY_DEAD, POLICY_DONE
@@ -21,7 +21,7 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
         exchange_path: of its shared memory.
         settings: as given.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_terminal()
     exchange = Exchange(exchange_path)
     status = exchange.status
     status["pid_policy"] = os.getpid()

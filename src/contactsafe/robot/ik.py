@@ -32,7 +32,6 @@ try:
 except ImportError:  # no wheel for this platform: the compiled solver serves alone
     TracIK = None
 
-_FEW_SEEDS = 6  # of them that an arm of fewer joints tries for the posture of a pose
 _SEEDS = 20  # fixed random postures that a cold start tries
 _ITERATIONS = 20
 
@@ -92,7 +91,8 @@ class InverseKinematics(Independent):
         """Return `posture`, or where that rule finds none, joint positions reached straight from a seed.
 
         In bounded time as well: a target that is streamed over the workspace is followed through the places where no
-        rule leads. There, and only there, the answer depends on the seed.
+        rule leads. There, and only there, the answer depends on the seed. With fewer than six joints the seed always
+        comes first, or the orientation nearest to a moving target's would jump.
 
         Raises:
             InvalidInputError: as `posture`.
@@ -168,14 +168,17 @@ class InverseKinematics(Independent):
         return q, self._reached(find_posture(self._rule, position, quat, q))
 
     def _first_posture(self, position, quat) -> tuple[np.ndarray, bool]:
-        """Search from home turned towards the position, then from the fixed seeds."""
+        """Search from home turned towards the position and from fixed seeds; return what is turned off the least."""
         towards = np.array(self._rule.home)
         turn_towards(self._rule, position, towards)
-        for seed in (towards, *self._seeds[:_FEW_SEEDS]):
+        best, least = self._arm.home.copy(), math.inf
+        for seed in (towards, *self._seeds):
             q, error = self._from_seed(position, quat, seed)
-            if self._reached(error):
-                return q, True
-        return self._arm.home.copy(), False
+            if self._reached(error) and error[1] < least:
+                best, least = q, error[1]
+            if least <= ROTATION_TOLERANCE:
+                break
+        return best, least < math.inf
 
     def _from_seed(self, position, quat, seed):
         q, search = np.empty(self._arm.n), solve_position_first if self._few else solve_ik

@@ -7,7 +7,6 @@ friction is taken off by a torque loop, as a Franka's own does.
 
 import os
 import select
-import signal
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
+from contactsafe.core.process import ignore_terminal
 from contactsafe.robot.franka import HAND
 from contactsafe.sim.franka_scene import OBSTACLE, TIP, FrankaScene, add_fixtures, add_obstacles, add_tip
 
@@ -250,7 +250,7 @@ def serve(
         told: "ready" and its address, or what is wrong goes out; anything that comes in ends it.
         truth: file for what happened, .npy; None for none.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_terminal()
     parent = os.getppid()
     try:
         robot = SimulatedFranka(scene, home, effect=effect)

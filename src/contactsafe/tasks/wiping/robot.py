@@ -52,10 +52,10 @@ class WipingRobot:
         config, path = WipingConfig(), shared.with_name(f"{shared.name}-board")
         placed, tip = _placed(looks), self.tool.tip
         board = config.board if placed is None else placed.board
-        create_shown(path, board)
         assert tip is not None
-        effect = WipedBoard(path, board, tip.half_size, "strokes", seed, rounds, first_s=WORK_BEGINS_S if met else 0.0)
         work = self.work(pictures=PhotographedBoard(path, arm, board, config.camera, seed, placed), **looks)
+        create_shown(path, board)
+        effect = WipedBoard(path, board, tip.half_size, "strokes", seed, rounds, first_s=WORK_BEGINS_S if met else 0.0)
         scene = FrankaScene(self.tool, TipSurface(friction=board.friction), (workbench(board.centre, board.size),))
         shown = map_shown(path, board)
 

@@ -6,7 +6,6 @@ where they are read, each of its tick.
 
 import multiprocessing
 import os
-import signal
 import time
 from dataclasses import dataclass, replace
 from multiprocessing.process import BaseProcess
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware.realsense import HEIGHT, WIDTH, CameraError, ColourCamera, SoftwareCamera
 from contactsafe.robot.arm import Arm
 from contactsafe.sim.config import WorldConfig
@@ -106,7 +106,7 @@ class Drawing:
 
 def draw_pictures(subject: Subject) -> None:
     """Be the camera of a run, in a process of its own, until whoever began it has ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_terminal()
     keep_to_one_thread()
     parent, drawing, number = os.getppid(), Drawing(subject), -1
     shown = drawing.shown[0]
