@@ -52,6 +52,24 @@ def test_arm_that_the_middle_of_its_range_stretches_out_can_move_its_tool_from_h
     assert sum(reached) >= 3
 
 
+@pytest.mark.parametrize("turned", [0.0, np.pi])
+def test_home_reached_into_the_table_that_the_arm_stands_on(turned):
+    """A shoulder whose range lies all to one side had the elbow below the base; hung from a ceiling it is the same."""
+    spec = column(("0 0 1", "0 1 0", "0 1 0", "0 1 0", "0 0 1", "0 1 0"))
+    shoulder = spec.joint("j1")
+    shoulder.range = [0.6, 4.6]
+    spec.body("link0").quat = [np.cos(0.5 * turned), np.sin(0.5 * turned), 0.0, 0.0]
+    if turned:
+        spec.body("link0").pos = [0.0, 0.0, -0.1]
+    arm = robots.from_mjcf(spec, "tool", actuators="torque")
+    data = mujoco.MjData(arm.model)
+    data.qpos[:] = arm.home
+    mujoco.mj_kinematics(arm.model, data)
+    up = 1.0 if turned == 0.0 else -1.0
+    heights = up * (np.vstack([data.xanchor, data.site_xpos[:1]]) - data.xanchor[0])[:, 2]
+    assert heights.min() > -0.1
+
+
 def test_home_is_within_the_range_and_carried_by_the_motors():
     arm = robots.from_mjcf(column(AXES, force=60.0), "tool", actuators="torque")
     data = mujoco.MjData(arm.model)

@@ -64,6 +64,8 @@ def add_flange(spec: mujoco.MjSpec, site: str | Flange) -> str:
         return site
     body = spec.body(site.body)
     if body is None:
+        if spec.site(site.body) is not None:
+            raise InvalidInputError(f"{shown(site.body)} is a site, no body; give its name itself, without Flange")
         names = listed(one.name for one in spec.bodies[1:] if one.name)
         raise InvalidInputError(f"body {shown(site.body)} of the flange is not in the model; give one of: {names}")
     taken = {

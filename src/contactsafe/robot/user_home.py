@@ -16,6 +16,9 @@ _KEY = mujoco.mjtObj.mjOBJ_KEY
 _TRIED, _INNER, _PARTS = 500, 0.15, (0.25, 0.5, 0.75, 1.0)
 """Postures that are tried, the part of a range at either end that they keep away from, and how far towards them."""
 
+_UPRIGHT, _BELOW_M = 0.9, 0.1
+"""Cosine from which on the first axis counts as upright, and how far below it a home may reach, m."""
+
 _NOTHING_M = 1e-6
 """What the tool moves by rounding alone, m: an arm of parallel axes never moves it to all sides."""
 
@@ -103,8 +106,9 @@ def usual_home(
 ) -> np.ndarray:
     """Choose a home where nobody gave one, (n,), rad: a posture from which the arm can work.
 
-    It is the middle of the range where the tool can be moved to all sides there and the motors carry the arm; else the
-    posture next to it, of many at random and those between, the same in every run.
+    It is the middle of the range where the tool can be moved to all sides there, the motors carry the arm, and nothing
+    of it is beside its base or beyond; else the posture next to it, of many at random and those between, the same in
+    every run.
 
     Args:
         model: of the scene.
@@ -117,9 +121,9 @@ def usual_home(
     middle, inner = 0.5 * (low + high), _INNER * (high - low)
     rng = np.random.default_rng(0)
     postures = np.vstack([middle, rng.uniform(low + inner, high - inner, (_TRIED, len(chain)))])
-    data, readiness = mujoco.MjData(nominal), np.zeros(len(postures))
+    data, readiness, away = mujoco.MjData(nominal), np.zeros(len(postures)), _away_from_base(model, chain[0])
     for i, q in enumerate(postures):
-        readiness[i] = _readiness(nominal, data, q, limits)
+        readiness[i] = _readiness(nominal, data, q, limits, away)
     ready = _READY * readiness.max()
     if readiness[0] >= ready:
         return middle
@@ -128,19 +132,44 @@ def usual_home(
     scene = mujoco.MjData(model)
     for i in np.argsort(distance, kind="stable"):
         scene.qpos[model.jnt_qposadr[chain]] = between[i]
-        if _readiness(nominal, data, between[i], limits) >= ready and not touching(model, scene, chain):
+        if _readiness(nominal, data, between[i], limits, away) >= ready and not touching(model, scene, chain):
             return between[i]
     return middle
 
 
-def _readiness(nominal: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, limits: np.ndarray) -> float:
-    """Return how far the tool moves at least for a radian of all joints, m; 0 where gravity takes half the torque."""
+def _readiness(
+    nominal: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, limits: np.ndarray, away: np.ndarray
+) -> float:
+    """Return how far the tool moves at least for a radian of all joints, m.
+
+    0 where gravity takes half the torque, or where the arm may reach into what it is mounted on.
+    """
     data.qpos[:], data.qvel[:] = q, 0.0
     mujoco.mj_fwdPosition(nominal, data)
     mujoco.mj_fwdVelocity(nominal, data)
-    if (np.abs(data.qfrc_bias) > 0.5 * limits).any():
+    if (np.abs(data.qfrc_bias) > 0.5 * limits).any() or _reaches_into_base(data, away):
         return 0.0
     return least_reach(nominal, data)
+
+
+def _away_from_base(model: mujoco.MjModel, first: int) -> np.ndarray:
+    """Return the direction from what the arm is mounted on, table or ceiling, to the arm, (3,); 0 if it is not upright.
+
+    It is that of the first joint's axis, to the side on which the joint lies of its base.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    axis, base = data.xaxis[first], data.xpos[model.body_parentid[model.jnt_bodyid[first]]]
+    if abs(axis[2]) < _UPRIGHT:
+        return np.zeros(3)
+    height = float(axis @ (data.xanchor[first] - base))
+    return axis * np.sign(height if abs(height) > _NOTHING_M else axis[2])
+
+
+def _reaches_into_base(data: mujoco.MjData, away: np.ndarray) -> bool:
+    """Tell whether a joint or the tool lies behind the first joint, in the direction of what the arm is mounted on."""
+    heights = (np.vstack([data.xanchor, data.site_xpos[:1]]) - data.xanchor[0]) @ away
+    return bool((heights < -_BELOW_M).any())
 
 
 def least_reach(nominal: mujoco.MjModel, data: mujoco.MjData) -> float:
