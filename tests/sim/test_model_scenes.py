@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -38,6 +39,25 @@ def test_arm_is_named_by_its_folder_and_file(of):
 
 def test_tool_may_be_a_body_of_the_file():
     assert load_model(f"{FILE}:wrist3").name == "examples/servo_arm:wrist3"
+
+
+def test_an_arm_on_a_lift_was_refused_though_the_tool_was_named(tmp_path):
+    """The joints that fit were told, in words of Python, to somebody at a command line."""
+    spec = mujoco.MjSpec.from_file(str(FILE))
+    lifted = mujoco.MjSpec()
+    lifted.option.timestep = spec.option.timestep
+    mast = lifted.worldbody.add_body(name="mast")
+    mast.add_joint(name="mast_z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1], range=[0, 0.3])
+    mast.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.05, 0.05, 0.01], mass=5.0)
+    spec.option.cone, spec.option.jacobian = lifted.option.cone, lifted.option.jacobian
+    spec.delete(spec.geom("floor"))
+    lifted.attach(spec, prefix="its_", frame=mast.add_frame())
+    path = tmp_path / "lifted.xml"
+    lifted.compile()
+    path.write_text(lifted.to_xml(), encoding="utf-8")
+    of = load_model(f"{path}:its_wrist3")
+    assert of.arm.n == load_model(str(FILE)).arm.n
+    assert "mast_z" in of.others
 
 
 def test_tool_that_is_nowhere_is_refused_with_those_that_are():

@@ -46,7 +46,7 @@ def classification_dtype(n: int) -> np.dtype:
             ("decision_rad", _f),  # displacement at which the contact is asked again whether it goes on
             ("advanced_rad", _f),  # by which the arm has moved into the contact since it last receded
             ("before_nm", _f),  # contact torque before that
-            ("came_off", _i),  # 1 where it has not pressed at all since the reference
+            ("came_off", _i),  # 1 once it has not pressed at all
         ]
     )
 
@@ -90,14 +90,13 @@ def classify(
         params: of classification.
     """
     _follow_contact(classification, isolation.direction, torque, step)
-    if classification.torque_smooth_nm < 0.0:
-        classification.came_off = 1
     active, probe = is_active(work), params.probe_m / isolation.lever_max
     softest = params.obstacle_stiffness_min * isolation.lever * isolation.lever
     if _comes_back(classification, _CERTAIN * probe):
         _advance(classification, work.taken_j, probe)
         if mode == REJECT and not active and _hinders(classification, probe, softest, doubt_nm):
             return OBSTACLE
+    _follow_bounce(classification, work.taken_j, probe)
     if classification.displacement_smooth_rad > probe or active:
         classification.advanced_rad, classification.before_nm = 0.0, classification.torque_smooth_nm
     if classification.displacement_smooth_rad <= 0.0:
@@ -133,19 +132,32 @@ def _receded(classification: Record, active: bool, doubt_nm: float, mode: int, p
         return OBSTACLE
     if displacement > classification.decision_rad:
         classification.decision_rad = displacement + probe
-        if classification.came_off == 0:  # what came off and presses again may have bounced: only its work tells
-            active = active or goes_on(drop, displacement, before, classification.reference_j, softest, doubt_nm)
+        active = active or goes_on(drop, displacement, before, classification.reference_j, softest, doubt_nm)
     return PUSH if active else NO_CONTACT
+
+
+@inlined
+def _follow_bounce(classification: Record, taken_j: float, probe: float) -> None:
+    """Begin anew as long as what came off and is back presses harder: it may have bounced, and swing into the arm."""
+    if classification.torque_smooth_nm < 0.0:
+        classification.came_off, classification.reference_nm = 1, 0.0
+    if classification.came_off != 0 and classification.torque_smooth_nm > classification.reference_nm:
+        _begin_here(classification, taken_j, probe)
 
 
 @inlined
 def _advance(classification: Record, taken_j: float, probe: float) -> None:
     """Begin anew where the arm moves into the contact."""
     classification.advanced_rad -= classification.displacement_smooth_rad
+    _begin_here(classification, taken_j, probe)
+
+
+@inlined
+def _begin_here(classification: Record, taken_j: float, probe: float) -> None:
+    """Compare what the arm recedes by from now on, and what that brings, with what there is now."""
     classification.displacement_rad -= classification.displacement_smooth_rad
     classification.displacement_smooth_rad, classification.furthest_rad, classification.decision_rad = 0.0, 0.0, probe
     classification.reference_nm, classification.reference_j = classification.torque_smooth_nm, taken_j
-    classification.came_off = 0
 
 
 @inlined

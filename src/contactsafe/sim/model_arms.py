@@ -10,11 +10,13 @@ import numpy as np
 from contactsafe.core.errors import InvalidInputError, ModelWarning, shown
 from contactsafe.robot import robots
 from contactsafe.robot.arm import Arm
+from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.ik_few_joints import FEW, solve_position_first
 from contactsafe.robot.spec_parts import Flange, linear, read_spec
 from contactsafe.robot.tool_point import find_tool
+from contactsafe.robot.user_chain import joints_above
 from contactsafe.robot.user_home import key_frame
 
 MOVES_M = 0.1
@@ -95,7 +97,22 @@ def _scene_of(path: Path, tool: str) -> tuple[mujoco.MjSpec, str | Flange, list[
     spec = read_spec(path)
     if not tool:
         return spec, *find_tool(spec)
-    return spec, tool if spec.site(tool) is not None else Flange(tool), None
+    site = spec.site(tool)
+    return (
+        spec,
+        tool if site is not None else Flange(tool),
+        _hinges_to(spec, tool if site is None else site.parent.name),
+    )
+
+
+def _hinges_to(spec: mujoco.MjSpec, body: str) -> list[str] | None:
+    """Return the hinges that move a body where a lift moves it too; None where there is nothing to choose."""
+    model = spec.compile()
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    moving = joints_above(model, max(found, 0))
+    hinges = [joint for joint in moving if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE]
+    driven = [joint for joint in hinges if actuators_of(model, joint)] or hinges
+    return None if len(hinges) == len(moving) else [model.joint(joint).name for joint in driven]
 
 
 def _lock_others(spec: mujoco.MjSpec, arm: Arm) -> dict[str, np.ndarray]:
