@@ -5,7 +5,7 @@ import pytest
 
 from contactsafe.hardware import realsense
 
-pytest.importorskip("pyrealsense2")
+pytest.importorskip("pyrealsense2", exc_type=ImportError)  # or without libusb
 
 from contactsafe.hardware.realsense import HEIGHT, WIDTH, CameraError, ColourCamera, SoftwareCamera
 

@@ -138,7 +138,7 @@ def _receded(classification: Record, active: bool, doubt_nm: float, mode: int, p
 
 @inlined
 def _follow_bounce(classification: Record, taken_j: float, probe: float) -> None:
-    """Begin anew as long as what came off and is back presses harder: it may have bounced, and swing into the arm."""
+    """Begin anew as long as what came off and is back presses more and more: it may have bounced, and swing back."""
     if classification.torque_smooth_nm < 0.0:
         classification.came_off, classification.reference_nm = 1, 0.0
     if classification.came_off != 0 and classification.torque_smooth_nm > classification.reference_nm:

@@ -106,8 +106,10 @@ def _asked_by_signal(exchange: Exchange) -> Iterator[None]:
     def ask(*_: Any) -> None:
         exchange.ask_to_stop(ASKED)
 
-    heard = [n for n in (*TERMINAL_SIGNALS, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN]  # as of nohup
-    before = {number: signal.signal(number, ask) for number in heard}
+    before = {number: signal.signal(number, ask) for number in (*TERMINAL_SIGNALS, signal.SIGTERM)}
+    for number, handler in before.items():
+        if handler is signal.SIG_IGN and number not in (signal.SIGINT, signal.SIGTERM):  # as nohup wants it
+            signal.signal(number, handler)
     try:
         yield
     finally:

@@ -11,7 +11,7 @@ from contactsafe.tasks.wiping.board import BoardConfig, Camera, pad_half
 from contactsafe.tasks.wiping.robot_board import WipedBoard, create_shown, map_shown
 
 pytest.importorskip("cv2")
-pytest.importorskip("pyrealsense2")
+pytest.importorskip("pyrealsense2", exc_type=ImportError)  # or without libusb
 
 from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
 from contactsafe.tasks.wiping.robot_work import WipingWork

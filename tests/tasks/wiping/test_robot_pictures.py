@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("cv2")
-pytest.importorskip("pyrealsense2")
+pytest.importorskip("pyrealsense2", exc_type=ImportError)  # or without libusb
 
 from contactsafe.hardware.realsense import CameraError
 from contactsafe.robot import robots
