@@ -4,8 +4,9 @@
     python tools/quoted_results.py docs/concepts/open.md      one page
     python tools/quoted_results.py --only disturbance         commands that contain this
 
-A quoted result is a block `sh` of one line with a block `text` right behind it, which may quote a part: from its first
-line on, as many lines as it has. A page is written after each command, so a run that is stopped has lost nothing.
+A quoted result is a block `sh` of one line with a block `text` right behind it, which may quote a part: the lines that
+are printed in the same words, in their order. A page is written after each command, so a run that is stopped has lost
+nothing.
 """
 
 import argparse
@@ -33,12 +34,20 @@ def label(line: str) -> str:
 
 
 def excerpt(printed: list[str], quoted: list[str]) -> list[str]:
-    """Return the lines printed that stand for the lines quoted; all of them where the first one is not found."""
+    """Return the lines printed that stand for the lines quoted; all of them where the first one is not found.
+
+    A line whose words have changed, as 'ok' to 'MISSED', is the one behind the line before it.
+    """
     labels = [label(line) for line in printed]
     if not quoted or label(quoted[0]) not in labels:
         return printed
-    first = labels.index(label(quoted[0]))
-    return printed[first : first + len(quoted)]
+    lines, at = [], 0
+    for line in quoted:
+        wanted = label(line)
+        at = labels.index(wanted, at) if wanted in labels[at:] else at
+        lines += printed[at : at + 1]
+        at += 1
+    return lines
 
 
 def renew(page: Path, only: str) -> None:

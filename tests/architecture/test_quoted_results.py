@@ -59,3 +59,9 @@ def test_commands_that_were_not_asked_for_are_not_run(tool, tmp_path, monkeypatc
 
 def test_what_prints_other_lines_is_quoted_whole(tool):
     assert tool.excerpt(["one 1", "two 2"], ["three 3"]) == ["one 1", "two 2"]
+
+
+def test_lines_left_out_of_a_quote_made_the_rest_of_it_other_lines(tool):
+    printed = ["reported 54 %", "onset 15 ms", "before 0 %", "", "isolated 64 % ok"]
+    assert tool.excerpt(printed, ["reported 1 %", "isolated 2 % ok"]) == ["reported 54 %", "isolated 64 % ok"]
+    assert tool.excerpt(printed, ["reported 1 %", "isolated 2 % MISSED"]) == ["reported 54 %", "onset 15 ms"]

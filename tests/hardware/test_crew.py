@@ -76,7 +76,7 @@ def test_a_run_in_which_all_do_their_part_ends_well_and_leaves_nothing(exchange)
 
 
 def test_a_terminal_that_was_closed_took_the_control_loop_with_it(exchange):
-    looks = []
+    looks, before = [], signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may be under nohup
 
     def close_terminal(status):
         if not looks:
@@ -85,7 +85,10 @@ def test_a_terminal_that_was_closed_took_the_control_loop_with_it(exchange):
         looks.append(int(status["tick"]))
 
     parts = [Part("control", crew_parts.control), Part("policy", crew_parts.policy), Part("watchdog", crew_parts.dog)]
-    ending = run_crew(exchange, parts, 30.0, close_terminal)
+    try:
+        ending = run_crew(exchange, parts, 30.0, close_terminal)
+    finally:
+        signal.signal(signal.SIGHUP, before)
     assert ending.went_well
     assert ending.reason == "asked to stop"
 
