@@ -1,13 +1,16 @@
 """Arrays on the stack: like any other while their function runs, and nothing of the heap."""
 
+import ast
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+import contactsafe
 from contactsafe.core.compiled import compiled
 from contactsafe.core.stack import stack_matrix, stack_vector
 
@@ -91,3 +94,27 @@ def test_how_often_a_tick_asks_the_heap(tmp_path):
     dynamics, tick = map(float, done.stdout.split())
     assert dynamics == 0.0
     assert tick <= 26.0
+
+
+def _made_on_the_stack(function):
+    """Give the names that a function's source gives to arrays of its own frame."""
+    assigned = [node for node in ast.walk(function) if isinstance(node, ast.Assign)]
+    on_stack = [node for node in assigned if "stack_vector(" in ast.unparse(node) or "stack_matrix(" in ast.unparse(node)]
+    return {name.id for node in on_stack for target in node.targets for name in ast.walk(target) if hasattr(name, "id")}
+
+
+def _returned(function):
+    """Give the names that a function hands out."""
+    values = [node.value for node in ast.walk(function) if isinstance(node, ast.Return) and node.value is not None]
+    parts = [part for value in values for part in (value.elts if isinstance(value, ast.Tuple) else [value])]
+    return {part.id for part in parts if isinstance(part, ast.Name)}
+
+
+def test_no_function_hands_out_an_array_of_its_own_frame():
+    """It works until something else is laid over it: forces that nobody felt once came of that."""
+    found = []
+    for path in sorted(Path(contactsafe.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and _made_on_the_stack(node) & _returned(node):
+                found.append(f"{path.name}: {node.name}")
+    assert found == []

@@ -60,3 +60,7 @@ def test_tool_pose_and_dynamics_check_their_input(panda):
         panda.tool_pose([0.0, 0.0])
     with pytest.raises(InvalidInputError, match=r"^qd has shape \(2,\)"):
         panda.dynamics(panda.home, [0.0, 0.0])
+
+
+def test_arm_says_which_it_is_in_one_line(panda):
+    assert repr(panda) == "Arm('panda', 7 joints, tool point 'tcp')"

@@ -64,12 +64,25 @@ def set_thresholds(
     for i in range(CT_qd.shape[0]):
         inertial = abs(observer.momentum_rate[i]) + abs(CT_qd[i])
         uncertainty = before_sensor * abs(friction[i] - params.arm.drag[i, 1]) + known.inertia_uncertainty * inertial
-        if arm.has_torque == 0:
-            uncertainty += params.arm.friction_unknown[i, 0] * abs(arm.qd[i]) + params.arm.friction_unknown[i, 1]
+        uncertainty += unknown_friction(i, arm, params.arm)
         uncertainty += known.delay_uncertainty_ticks * abs(observer.torque_ramp[i]) + observer.tool_torque_unseen[i]
         detection.model_uncertainty[i] = uncertainty
         detection.threshold[i] = known.residual_threshold + uncertainty + GRAVITY_SIGMAS * gravity_sigma[i]
         detection.threshold[i] += _NOISE_SIGMAS * noise_left(observer.noise, i, allowed_nm)
+
+
+@inlined
+def unknown_friction(i: int, arm: Record, known: Record) -> float:
+    """Return the most that a joint's friction may be beyond the model's, N m; none before a sensor of torque.
+
+    Args:
+        i: joint, from 0 on.
+        arm: of the state.
+        known: `arm_dtype` record.
+    """
+    if arm.has_torque != 0:
+        return 0.0
+    return known.friction_unknown[i, 0] * abs(arm.qd[i]) + known.friction_unknown[i, 1]
 
 
 @inlined

@@ -218,8 +218,9 @@ def estimate_at(controllers: np.ndarray, i: int) -> None:
 def _feel_alone(state: Record, c: Record, J_bar: Matrix) -> None:
     """Report what touches arm or tool where no law goes by it."""
     follow_tool_force(
-        state.tool_wrench, state.arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain
-    )
+        state.tool_wrench, state.arm, state.mode, state.observer.residual_fast, J_bar, c.params.arm,
+        state.step.probe_gain,
+    )  # fmt: skip
     follow_touch(c)
     state.touch.withholds = state.touch.touching
     c.output.kind = state.touch.kind

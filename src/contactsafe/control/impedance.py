@@ -19,7 +19,7 @@ from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
 from contactsafe.core.linalg import matvec_t_into, shorten
 from contactsafe.core.stack import stack_vector
-from contactsafe.robot.friction import DRY_STEEP, FRICTION_FRACTION
+from contactsafe.robot.friction import DRY_STEEP
 
 _f = np.float64
 
@@ -150,24 +150,39 @@ def posture_torques_into(
         damping[i] = -D * arm.qd[i]
 
 
-@inlined
-def overcome_stiction(elastic: Vector, qd: Vector, arm: Record) -> None:
-    """Add to an elastic torque in place what dry friction is known to keep from the links: in the torque's direction.
+OVERCOME_FRACTION = 0.9
+"""Of the friction that a file declares and no compensation by velocity takes off: less than holds a joint by itself."""
 
-    At rest the velocity does not say in which direction friction acts, but it is against what would move the joint.
-    Added is as much again as is asked for, up to a part of the friction: never more than holds the joint by itself. In
-    motion it fades: then friction is compensated by velocity.
+_STIFFEST, _MOST_GAIN = 4500.0, 9.0
+"""Stiffness that a small error may be met with, 1/s²: a sampled loop is stable far beyond; and times what is asked for
+that is added at most."""
+
+_FAST_RAD_S = 1.0
+"""At such a speed nothing is stuck."""
+
+
+@inlined
+def overcome_friction(elastic: Vector, qd: Vector, K_task: Vector, arm: Record) -> None:
+    """Add to an elastic torque in place what friction is known to keep from the links: in the torque's direction.
+
+    At rest the velocity does not say in which direction friction acts, and a light joint must not be driven by all of
+    it, but it is against what would move the joint. Added is a multiple of what is asked for, less where the task is
+    stiff by itself, up to a part of the friction that is not compensated: never more than holds the joint by itself.
 
     Args:
         elastic: of task and posture, (n,), N m; updated.
         qd: (n,), rad/s.
+        K_task: stiffness in force, (6,), 1/s².
         arm: `arm_dtype` record.
     """
+    gain = min(max(_STIFFEST / max(K_task.max(), 1.0) - 1.0, 1.0), _MOST_GAIN)
     for i in range(elastic.shape[0]):
-        dry = arm.friction_unknown[i, 1]
-        if dry != 0.0:
-            most = FRICTION_FRACTION * dry * (1.0 - math.tanh(0.5 * DRY_STEEP * abs(qd[i])))
-            elastic[i] += min(max(elastic[i], -most), most)
+        viscous, dry = arm.friction_unknown[i, 0], arm.friction_unknown[i, 1]
+        if dry != 0.0 or viscous != 0.0:
+            speed = abs(qd[i])
+            left = viscous * speed + max(dry - arm.drag[i, 2] * math.tanh(0.5 * DRY_STEEP * speed), 0.0)
+            most = OVERCOME_FRACTION * left * (1.0 - math.tanh(speed / _FAST_RAD_S))
+            elastic[i] += min(max(gain * elastic[i], -most), most)
 
 
 @inlined

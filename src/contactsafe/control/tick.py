@@ -29,7 +29,7 @@ from contactsafe.control.estimation import (
 from contactsafe.control.impedance import (
     compose_into,
     follow_gains,
-    overcome_stiction,
+    overcome_friction,
     posture_torques_into,
     set_joint_damping,
     task_wrenches,
@@ -128,9 +128,9 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
     if params.impedance.friction_compensation != 0:
-        overcome_stiction(elastic, arm.qd, params.arm)
+        overcome_friction(elastic, arm.qd, impedance.K_task, params.arm)
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
-    follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, state.step.probe_gain)
+    follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, params.arm, state.step.probe_gain)
     contact_n = params.classification.tool_contact_n
     limit = follow_tool_limit(tool, arm, state.contact_work, contact_n, params.reaction)
     scale, reason = contact_bound.tool_task_scale(F_spring, tool.force, contact_n, limit)

@@ -2,6 +2,7 @@
 
 from contactsafe.control.codes import FREE
 from contactsafe.control.contact_work import is_active
+from contactsafe.control.detection import unknown_friction
 from contactsafe.control.laws import observer_step
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import inlined
@@ -13,10 +14,21 @@ _PRESSED_J = 0.02
 
 
 @inlined
-def follow_tool_force(tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, gain: float) -> None:
+def follow_tool_force(
+    tool: Record, arm: Record, mode: int, residual_fast: Vector, J_bar: Matrix, known: Record, gain: float
+) -> None:
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
 
     While something touches the arm, that is the force of before and what has met the tool since.
+
+    Args:
+        tool: `tool_wrench_dtype` record; its force is updated.
+        arm: of the state.
+        mode: of the controller.
+        residual_fast: r, (n,), N m.
+        J_bar: J#, (n, 6).
+        known: `arm_dtype` record; what its unknown friction may be no force has to explain.
+        gain: of the smoothing.
     """
     wrench = stack_vector(6)
     if arm.has_wrench != 0:
@@ -25,8 +37,18 @@ def follow_tool_force(tool: Record, arm: Record, mode: int, residual_fast: Vecto
         wrench[:] = tool.wrench
         wrench[:3] += tool.in_contact.force
     else:
-        matvec_t_into(J_bar, residual_fast, wrench)
+        felt = _beyond_friction_into(residual_fast, arm, known, stack_vector(residual_fast.shape[0]))
+        matvec_t_into(J_bar, felt, wrench)
     observer_step(tool.force, gain, wrench[:3])
+
+
+@inlined
+def _beyond_friction_into(residual: Vector, arm: Record, known: Record, out: Vector) -> Vector:
+    """Fill what of a residual is more than friction that the model does not know, (n,), N m, and give it back."""
+    for i in range(residual.shape[0]):
+        unknown = unknown_friction(i, arm, known)
+        out[i] = residual[i] - min(max(residual[i], -unknown), unknown)
+    return out
 
 
 @inlined

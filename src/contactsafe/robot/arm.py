@@ -33,7 +33,7 @@ class Pose(NamedTuple):
     quat: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Arm(Independent):
     """A serial torque-controlled arm with its tool.
 
@@ -100,6 +100,10 @@ class Arm(Independent):
         for name, value in as_numbers(self).items():
             object.__setattr__(self, name, value)
         refuse_unsound(self)
+
+    def __repr__(self) -> str:
+        """Say which arm it is in one line; its numbers are its attributes."""
+        return f"Arm({self.name!r}, {self.n} joints, tool point {self.site!r})"
 
     @property
     def n(self) -> int:
