@@ -47,6 +47,11 @@ def test_mesh_of_the_mass_is_asked_for_as_well_where_the_tool_is_searched_for(tm
         load_model(str(path))
 
 
+def test_mesh_that_is_not_there_stopped_an_arm_whose_tool_is_named(tmp_path):
+    of = load_model(f"{write(tmp_path, SEEN)}:{FLANGE.body}")
+    assert "1 meshes are left out" in of.notes
+
+
 @pytest.mark.filterwarnings("ignore:arm:UserWarning")
 def test_one_of_several_meshes_of_a_name_is_taken_with_a_note(tmp_path):
     for folder in ("left", "right"):

@@ -127,7 +127,7 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
         impedance, arm, target.q_posture, state.reaction.posture_scale, params, elastic_posture, damping_posture
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
-    if params.impedance.friction_compensation != 0:
+    if params.impedance.friction_compensation != 0 and state.mode == FREE:
         overcome_friction(elastic, arm.qd, impedance.K_task, params.arm)
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
     follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, params.arm, state.step.probe_gain)

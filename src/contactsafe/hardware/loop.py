@@ -138,7 +138,7 @@ def _follow_rest(c: Record, loop: Record) -> None:
 def _tell(c: Record, loop: Record, outbox: np.ndarray, seen_words: np.ndarray) -> None:
     """Publish what the policy may know."""
     seen, wrench = loop.seen, c.state.tool_wrench
-    seen.tick, seen.mode, seen.link = loop.tick, c.output.mode, c.output.link
+    seen.tick, seen.held, seen.mode, seen.link = loop.tick, loop.gate.holds, c.output.mode, c.output.link
     seen.q[:], seen.position[:], seen.rotation[:] = c.state.arm.q, c.output.position, c.output.rotation
     seen.force[:], seen.residual[:] = wrench.force, c.output.residual_fast
     held, target = c.state.target, seen.target

@@ -39,6 +39,7 @@ def seen_dtype(n: int) -> np.dtype:
             ("force", _f, (3,)),  # on the tool, world axes, N
             ("residual", _f, (n,)),  # external torque of the joints, N m
             ("target", target_dtype(n)),  # in force
+            ("held", _i),  # the arm is told to stay where it is
             ("mode", _i),
             ("link", _i),  # in contact, 0 for none
         ]

@@ -28,6 +28,9 @@ _ARRIVED_M = 0.01
 _TURN_RAD_S = 0.5
 """The tool is turned to where the work begins no faster than this."""
 
+_ELAPSED_S = 0.05
+"""Time that a step makes up for at most where steps came late."""
+
 _BLIND_STEPS = 600
 """Policy steps for which the arm waits for a camera that shows nothing new, ten seconds, before the run ends."""
 
@@ -78,6 +81,7 @@ class Actor(Unique):
         self.words, self.seen_words = as_words(self.message), as_words(self.seen)
         self.steps, self.waited, self.rounds, self.action = -1, 0, 0, np.zeros(18)
         self.done, self.blind, self.held_at = False, 0, np.zeros(3)
+        self.elapsed_s, self.seen_tick = 1.0 / POLICY_RATE_HZ, 0
         self._warm_up()
 
     def _warm_up(self) -> None:
@@ -126,10 +130,16 @@ class Actor(Unique):
         return True
 
     def _take_over(self) -> None:
-        """Take what the control process told as it is now: where the tool is, and the target in force."""
+        """Take what the control process told as it is now: where the tool is, how late it is, where the arm is held.
+
+        Where it is not, the target goes on from what was told last: that in force is one behind as often as not.
+        """
         shadow, seen = self.shadow[0], self.seen[0]
         shadow["output"]["position"], shadow["output"]["rotation"] = seen["position"], seen["rotation"]
-        shadow["target"] = seen["target"]
+        if seen["held"] or self.message["number"] == 0:
+            shadow["target"] = seen["target"]
+        tick = int(seen["tick"])
+        self.elapsed_s, self.seen_tick = min(0.001 * (tick - self.seen_tick), _ELAPSED_S), tick
         look_at(self.shadow, 0, self.pose, self.target)
 
     def _travel(self) -> bool:
@@ -140,9 +150,9 @@ class Actor(Unique):
             path[:2] = 0.0  # up before aside
         elif np.any(np.abs(path[:2]) > 1e-6):
             path[2] = 0.0  # aside before down
-        length, stride = float(np.linalg.norm(path)), self.work.travel_m_s * self.settings.speed / POLICY_RATE_HZ
+        length, stride = float(np.linalg.norm(path)), self.work.travel_m_s * self.settings.speed * self.elapsed_s
         target["position"] += path * min(1.0, stride / max(length, 1e-9))
-        turn_left = _turn_towards(target["quat"], start.quat, _TURN_RAD_S * self.settings.speed / POLICY_RATE_HZ)
+        turn_left = _turn_towards(target["quat"], start.quat, _TURN_RAD_S * self.settings.speed * self.elapsed_s)
         target["K_task"], target["D_task"] = self.stiffness, self.damping
         posture = np.empty(self.settings.arm.n)
         if find_posture(self.rule, target["position"], target["quat"], posture)[0] <= POSITION_TOLERANCE:

@@ -37,6 +37,21 @@ def find_meshes(spec: mujoco.MjSpec, findings: Findings) -> None:
         )
 
 
+def make_compilable(spec: mujoco.MjSpec) -> None:
+    """Edit a scene so that it compiles, and warn of what is left out.
+
+    Args:
+        spec: of the scene.
+
+    Raises:
+        InvalidInputError: a body would lose its mass.
+    """
+    findings = Findings()
+    find_meshes(spec, findings)
+    findings.raise_problems()
+    findings.warn(spec.modelname)
+
+
 def _not_found(spec: mujoco.MjSpec, findings: Findings) -> dict[str, Any]:
     """Return the meshes whose files are nowhere, by name; those that are elsewhere are pointed to, and told."""
     missing = {}

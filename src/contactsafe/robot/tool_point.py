@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import mujoco
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.robot.findings import Findings
-from contactsafe.robot.missing_meshes import find_meshes
+from contactsafe.robot.missing_meshes import make_compilable
 from contactsafe.robot.spec_parts import Flange, compiled_spec, name_all
 
 _HINGE, _FREE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_FREE)
@@ -28,10 +27,7 @@ def find_tool(spec: mujoco.MjSpec) -> tuple[Flange, list[str]]:
         InvalidInputError: there is no chain of two hinges.
     """
     name_all(spec)
-    findings = Findings()
-    find_meshes(spec, findings)
-    findings.raise_problems()
-    findings.warn(spec.modelname)
+    make_compilable(spec)
     model = compiled_spec(spec, "the MjSpec")
     body, hinges = 0, list[int]()
     while (follower := _followed(model, body, hinges)) is not None:

@@ -14,6 +14,7 @@ from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.ik import POSITION_TOLERANCE, solve_ik
 from contactsafe.robot.ik_few_joints import FEW, solve_position_first
+from contactsafe.robot.missing_meshes import make_compilable
 from contactsafe.robot.spec_parts import Flange, linear, read_spec
 from contactsafe.robot.tool_point import find_tool
 from contactsafe.robot.user_chain import joints_above
@@ -97,6 +98,7 @@ def _scene_of(path: Path, tool: str) -> tuple[mujoco.MjSpec, str | Flange, list[
     spec = read_spec(path)
     if not tool:
         return spec, *find_tool(spec)
+    make_compilable(spec)
     site = spec.site(tool)
     return (
         spec,

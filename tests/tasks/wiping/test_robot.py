@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from contactsafe.control.codes import FREE, REJECT
 from contactsafe.hardware.messages import seen_dtype
 from contactsafe.robot import robots
 from contactsafe.tasks.wiping.board import BoardConfig, Camera, pad_half
@@ -141,6 +142,21 @@ def test_work_begins_with_ink_ends_without_and_needs_sight(arm):
     pictures.age_ms = math.inf
     work.look(seen, np.zeros(6), 0)
     assert work.is_blind()
+
+
+def test_force_is_what_is_more_than_in_the_air(arm):
+    """A load or friction that the model does not know is no board; a push while the tool waits is no load."""
+    work = WipingWork(Shown(np.full((455, 455, 3), 220, np.uint8)))
+    work.prepare(arm, False)
+    seen = np.zeros(1, seen_dtype(7))[0]
+    seen["q"], seen["force"] = arm.home, (0.1, -0.3, 0.8)
+    for _ in range(200):
+        work.look(seen, np.zeros(6), -1)
+    seen["mode"], seen["force"] = REJECT, (0.0, 0.0, -20.0)
+    for _ in range(60):
+        work.look(seen, np.zeros(6), -1)
+    seen["mode"], seen["force"] = FREE, (0.1, -0.3, 6.8)
+    np.testing.assert_allclose(work.look(seen, np.zeros(6), 0)["force"], [0.0, 0.0, 6.0], atol=0.01)
 
 
 def test_an_arm_that_had_moved_on_since_the_picture_was_ink(arm):

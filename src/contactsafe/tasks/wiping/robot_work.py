@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from contactsafe.control.codes import FREE
 from contactsafe.policy.action import DOWN
 from contactsafe.policy.action_config import ActionConfig
 from contactsafe.robot.arm import Arm, Pose
@@ -28,6 +29,9 @@ _BLIND_MS = 150.0
 
 _REMEMBERED = 30
 """Postures of the last half second."""
+
+_TARE = 0.05
+"""Share of a step in what the tool is taken to be pressed with while it waits in the air: the last third of a second."""
 
 _LEAST_PX = 3
 """A mask of fewer inked pixels shows none."""
@@ -97,14 +101,17 @@ class WipingWork:
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
+        self._tare_n = np.zeros(3)
         self.pictures.open(lockstep)
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
         """Segment the newest picture; where the arm hides the board is known by its joints.
 
-        Where the board was calibrated to lie elsewhere, the pose is given in the policy's frame, too.
+        Force is what is more than in the air, where the tool waits and nobody pushes the arm. Where the board was
+        calibrated to lie elsewhere, the pose is given in the policy's frame, too.
         """
-        del steps
+        if steps < 0 and seen["mode"] == FREE:
+            self._tare_n += _TARE * (seen["force"] - self._tare_n)
         picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
         self._past.append((float(seen["tick"]), seen["q"].copy()))
         if number != self._number:
@@ -115,7 +122,7 @@ class WipingWork:
             shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
             self._clean = 0 if shows else self._clean + 1
             self._inked = self._inked + 1 if shows else 0
-        observed = {"mask": self._mask[..., None], "force": np.asarray(seen["force"])}
+        observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
         return observed
