@@ -5,19 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.control.plant import Plant, controller_at, hold, reach
+from tests.control.plant import UNTOUCHED, Plant, controller_at, hold, reach
 
 from contactsafe import Measurement, presets
-from contactsafe.control.impedance import OVERCOME_FRACTION, overcome_friction
+from contactsafe.control.codes import COMPLY, FREE
+from contactsafe.control.impedance import MOST_GAIN, friction_gain, overcome_friction
 from contactsafe.core.compiled import compiled
+from contactsafe.robot.friction import DRY_STEEP
 
 SAFE = presets.safe()
 DRY_NM = 0.8
 
 
 @compiled
-def _overcome(elastic, qd, c):
-    overcome_friction(elastic, qd, c.state.impedance.K_task, c.params.arm)
+def _overcome(elastic, task, qd, gain, c):
+    overcome_friction(elastic, task, qd, gain, c.params.arm)
+
+
+@compiled
+def _gain(K_task, D_task, delay_s):
+    return friction_gain(K_task, D_task, delay_s)
 
 
 def declared(arm, dry_nm):
@@ -51,7 +58,7 @@ def test_stiction_that_holds_the_arm_still_is_no_contact(panda):
 
 
 def tool_force_after_a_move(panda, pushed_n):
-    """Move the tool of an arm that 3 N m of friction hold, without a sensor, pushed or not; return the force felt, N."""
+    """Move the tool of an arm with 3 N m of friction, without a sensor, pushed or not; return the force felt, N."""
     arm, felt = declared(panda, 3.0), []
     plant = Plant(arm, model=copy.deepcopy(arm.model))
     plant.model.dof_frictionloss[:] = 3.0
@@ -67,22 +74,54 @@ def test_stiction_is_no_force_on_the_tool(panda):
     assert tool_force_after_a_move(panda, 80.0) > SAFE.classification.tool_contact_n
 
 
-@pytest.mark.parametrize("asked", [-5.0, -0.3, 0.2, 3.0])
-def test_what_is_added_has_the_commands_direction_and_is_no_more_than_the_friction(panda, asked):
-    controller = controller_at(declared(panda, DRY_NM), SAFE)
-    elastic = np.full(panda.n, asked)
-    _overcome(elastic, np.zeros(panda.n), controller.record)
-    added = elastic - asked
-    assert (added * asked > 0.0).all()
-    assert (np.abs(added) <= OVERCOME_FRACTION * DRY_NM + 1e-12).all()
+@pytest.mark.parametrize("gain", [0.0, 2.0, 9.0])
+def test_what_is_added_has_the_tasks_direction_and_with_compensation_is_no_more_than_the_friction(panda, gain):
+    rng = np.random.default_rng(4)
+    viscous, dry = rng.uniform(0.0, 5.0, 7), rng.uniform(0.0, 2.0, 7)
+    drag = np.column_stack([np.zeros(7), np.zeros(7), rng.uniform(0.0, 0.8, 7) * dry])
+    arm = replace(panda, friction=np.zeros((7, 3)), drag=drag, friction_unknown=np.column_stack([viscous, dry]))
+    record = controller_at(arm, SAFE).record
+    for _ in range(200):
+        qd, task, posture = rng.normal(0.0, 0.3, 7), rng.normal(0.0, 0.3, 7), rng.normal(0.0, 1.0, 7)
+        elastic = task + posture
+        _overcome(elastic, task, qd, gain, record)
+        added = elastic - task - posture
+        compensated = drag[:, 2] * np.tanh(0.5 * DRY_STEEP * np.abs(qd))
+        assert (added * task >= -1e-12).all()
+        assert (np.abs(added) <= gain * np.abs(task) + 1e-12).all()
+        assert (np.abs(added) + compensated <= viscous * np.abs(qd) + dry + 1e-12).all()
 
 
 def test_nothing_is_added_in_fast_motion_or_where_nothing_is_declared(panda):
     fast = np.full(panda.n, 10.0)
     for arm, qd in ((declared(panda, DRY_NM), fast), (panda, np.zeros(panda.n))):
         elastic = np.full(panda.n, 2.0)
-        _overcome(elastic, qd, controller_at(arm, SAFE).record)
+        _overcome(elastic, elastic.copy(), qd, MOST_GAIN, controller_at(arm, SAFE).record)
         np.testing.assert_allclose(elastic, 2.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(150.0, 24.0), (450.0, 42.0), (1500.0, 10.0), (450.0, 2.0)])
+def test_small_errors_are_met_with_no_more_than_the_loops_delay_allows(stiffness, damping):
+    K, D, delay_s = np.full(6, stiffness), np.full(6, damping), 0.002
+    gain = _gain(K, D, delay_s)
+    assert 0.0 <= gain <= MOST_GAIN
+    assert gain == 0.0 or damping >= 2.0 * delay_s * (1.0 + gain) * stiffness * (1.0 - 1e-9)
+    K[0] = 0.0  # a direction that was let go
+    assert _gain(K, D, delay_s) == gain
+
+
+def test_nothing_is_added_while_something_touches_the_arm(panda):
+    """Friction acts against what is pushed then, not against the task: arms with friction were moved further."""
+    arm, asked = declared(panda, 3.0), {}
+    for mode in (FREE, COMPLY):
+        controller = controller_at(arm, SAFE)
+        plant = Plant(arm)
+        plant.run(controller, hold(arm), 5, UNTOUCHED)
+        controller.record["state"]["mode"] = mode
+        controller.record["state"]["detection"]["quiet_ticks"] = 0
+        out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), reach(arm, [0.0, 0.02, 0.0]))
+        asked[mode] = np.abs(out.torque - arm.dynamics(plant.q, plant.qd)["g"]).max()
+    assert asked[COMPLY] < asked[FREE]
 
 
 def test_arm_that_holds_still_and_has_the_friction_stays(panda):

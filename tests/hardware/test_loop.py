@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from contactsafe.hardware import states
+from contactsafe.hardware.mailbox import receive
+from contactsafe.hardware.messages import as_words, seen_dtype
 from contactsafe.hardware.port import RobotError
 
 
@@ -177,3 +179,19 @@ def test_a_push_is_rejected_while_the_policy_waits(bench):
         away = rows["output"]["position"] - rows["output"]["position"][450]
         moved[preset] = np.linalg.norm(away[500:1500], axis=1).max()
     assert moved["safe"] < 0.5 * moved["vices"]
+
+
+def test_the_policy_is_told_that_the_arm_is_held_until_a_good_target_comes(bench):
+    told = {}
+
+    def each(one, tick):
+        once_late(80)(one, tick)
+        seen = np.zeros(1, seen_dtype(7))
+        if receive(one.exchange.seen, as_words(seen)) > 0:
+            told[int(seen[0]["tick"])] = int(seen[0]["held"])
+
+    bench(each).run(700)
+    held = [tick for tick in told if told[tick] and tick < 700]
+    assert held == list(range(held[0], held[-1] + 1))
+    assert 430 < held[0] < 460
+    assert 475 < held[-1] < 500

@@ -22,7 +22,7 @@ from contactsafe.tasks.insertion.scene import PEG
 class Work(InsertionWork):
     """Insertion whose readiness, end and sight the test decides."""
 
-    ready, done, blind = True, False, False
+    ready, done, blind, stalled = True, False, False, False
 
     def is_ready(self):
         return self.ready
@@ -32,6 +32,9 @@ class Work(InsertionWork):
 
     def is_blind(self):
         return self.blind
+
+    def is_stalled(self):
+        return self.stalled
 
 
 class Stage:
@@ -136,6 +139,34 @@ def test_steps_that_came_late_or_that_control_had_not_taken_over_yet_were_lost(s
         one.step()
         seen["target"] = target  # still in force
     assert math.dist(before, one.path[-1]) == pytest.approx(10 * 0.05 * one.work.travel_m_s, rel=1e-6)
+
+
+def test_work_that_gets_nowhere_is_begun_anew_from_the_start_and_is_no_round_done(stage):
+    """A policy that remembers nothing once circled one spot of ink for six minutes."""
+    one = stage(rounds=1)
+    one.travel()
+    for _ in range(30):
+        one.step()
+    one.work.stalled = True
+    one.step()
+    one.work.stalled = False
+    assert one.actor.steps == -1
+    assert not one.actor.done
+    one.travel()
+    assert math.dist(one.path[-1], one.work.start.position) < 0.01
+
+
+def test_where_the_arm_was_held_the_target_goes_on_from_there(stage):
+    one = stage()
+    one.travel()
+    for _ in range(5):
+        one.step()
+    seen, before = one.actor.seen[0], one.path[-1].copy()
+    held_at = np.add(before, [0.0, 0.008 if before[1] < one.work.start.position[1] else -0.008, 0.0])
+    seen["held"], seen["target"]["position"] = 1, held_at
+    one.step()
+    told = one.message[0]["position"]
+    assert math.dist(told, held_at) < math.dist(told, before)
 
 
 def test_from_below_it_goes_up_first(stage):

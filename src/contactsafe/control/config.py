@@ -186,8 +186,8 @@ class ImpedanceConfig(Stage):
     friction_compensation: bool = parameter(
         True,
         "",
-        "add the arm's nominal friction torque to the command, and expect it in the observer; at rest "
-        "add, in the direction of the elastic torque, most of the dry friction that the arm's file declares",
+        "add the arm's nominal friction torque to the command, and expect it in the observer; while nothing touches "
+        "the arm add, in the direction of the task's torque, most of what else of friction the arm's file declares",
     )
     stiffness_range: tuple[float, float] = parameter((10.0, 1500.0), "1/s²", "allowed K_task")
     damping_range: tuple[float, float] = parameter((2.0, 120.0), "1/s", "allowed D_task")

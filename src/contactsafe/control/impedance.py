@@ -153,36 +153,52 @@ def posture_torques_into(
 OVERCOME_FRACTION = 0.9
 """Of the friction that a file declares and no compensation by velocity takes off: less than holds a joint by itself."""
 
-_STIFFEST, _MOST_GAIN = 4500.0, 9.0
-"""Stiffness that a small error may be met with, 1/s²: a sampled loop is stable far beyond; and times what is asked for
-that is added at most."""
+MOST_GAIN = 9.0
+"""Times what is asked for that is added at most."""
 
 _FAST_RAD_S = 1.0
 """At such a speed nothing is stuck."""
 
 
 @inlined
-def overcome_friction(elastic: Vector, qd: Vector, K_task: Vector, arm: Record) -> None:
-    """Add to an elastic torque in place what friction is known to keep from the links: in the torque's direction.
+def friction_gain(K_task: Vector, D_task: Vector, delay_s: float) -> float:
+    """Return how many times a small error's torque may be added to it: D ≥ 2 τ (1 + gain) K, each axis by itself.
+
+    As `task_damping_into` has it of the stiffness that is asked for: a spring that acts later drives what it holds.
+
+    Args:
+        K_task, D_task: in force, (6,), 1/s² and 1/s.
+        delay_s: τ of the loop, s.
+    """
+    gain = MOST_GAIN
+    for i in range(6):
+        if K_task[i] > 0.0:
+            gain = min(gain, D_task[i] / (2.0 * delay_s * K_task[i]) - 1.0)
+    return max(gain, 0.0)
+
+
+@inlined
+def overcome_friction(elastic: Vector, task: Vector, qd: Vector, gain: float, arm: Record) -> None:
+    """Add to an elastic torque in place what friction is known to keep from the links: in the direction of the task's.
 
     At rest the velocity does not say in which direction friction acts, and a light joint must not be driven by all of
-    it, but it is against what would move the joint. Added is a multiple of what is asked for, less where the task is
-    stiff by itself, up to a part of the friction that is not compensated: never more than holds the joint by itself.
+    it, but it is against what would move the joint. Added is a multiple of what the task asks for, up to a part of the
+    friction that is not compensated: never more than holds the joint by itself.
 
     Args:
         elastic: of task and posture, (n,), N m; updated.
+        task: of the task alone, (n,), N m.
         qd: (n,), rad/s.
-        K_task: stiffness in force, (6,), 1/s².
+        gain: see `friction_gain`.
         arm: `arm_dtype` record.
     """
-    gain = min(max(_STIFFEST / max(K_task.max(), 1.0) - 1.0, 1.0), _MOST_GAIN)
     for i in range(elastic.shape[0]):
         viscous, dry = arm.friction_unknown[i, 0], arm.friction_unknown[i, 1]
         if dry != 0.0 or viscous != 0.0:
             speed = abs(qd[i])
             left = viscous * speed + max(dry - arm.drag[i, 2] * math.tanh(0.5 * DRY_STEEP * speed), 0.0)
             most = OVERCOME_FRACTION * left * (1.0 - math.tanh(speed / _FAST_RAD_S))
-            elastic[i] += min(max(gain * elastic[i], -most), most)
+            elastic[i] += min(max(gain * task[i], -most), most)
 
 
 @inlined

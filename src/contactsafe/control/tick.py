@@ -29,6 +29,7 @@ from contactsafe.control.estimation import (
 from contactsafe.control.impedance import (
     compose_into,
     follow_gains,
+    friction_gain,
     overcome_friction,
     posture_torques_into,
     set_joint_damping,
@@ -43,7 +44,7 @@ from contactsafe.control.tool_force import follow_tool_force, follow_tool_limit
 from contactsafe.control.touch import follow_touch
 from contactsafe.core.arrays import Matrix, Record, Vector
 from contactsafe.core.compiled import compiled, inlined
-from contactsafe.core.linalg import matmul
+from contactsafe.core.linalg import matmul, matvec_t_into
 from contactsafe.core.stack import stack_vector
 
 
@@ -128,7 +129,9 @@ def _law(c: Record, Lambda: Matrix, J_bar: Matrix) -> Vector:
     )
     elastic = compose_into(dynamics.J, F_spring, N_ct, elastic_posture, stack_vector(n))
     if params.impedance.friction_compensation != 0 and state.mode == FREE:
-        overcome_friction(elastic, arm.qd, impedance.K_task, params.arm)
+        task = matvec_t_into(dynamics.J, F_spring, stack_vector(n))
+        gain = friction_gain(impedance.K_task, impedance.D_task, params.clock.loop_delay_s)
+        overcome_friction(elastic, task, arm.qd, gain, params.arm)
     damping = compose_into(dynamics.J, F_damping, N_ct, damping_posture, stack_vector(n))
     follow_tool_force(tool, arm, state.mode, state.observer.residual_fast, J_bar, params.arm, state.step.probe_gain)
     contact_n = params.classification.tool_contact_n

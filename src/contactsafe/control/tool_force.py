@@ -19,7 +19,8 @@ def follow_tool_force(
 ) -> None:
     """Smooth the force of the environment on the tool: measured, or without a sensor what the residual says, J#ᵀ r.
 
-    While something touches the arm, that is the force of before and what has met the tool since.
+    r is less what friction that the model does not know may come to. While something touches the arm, it is the force
+    of before and what has met the tool since.
 
     Args:
         tool: `tool_wrench_dtype` record; its force is updated.

@@ -18,7 +18,6 @@ from contactsafe.policy.action import apply_one, look_at
 from contactsafe.policy.action_config import action_limits
 from contactsafe.policy.bundle import Bundle
 from contactsafe.policy.policy import Policy
-from contactsafe.policy.rate import POLICY_RATE_HZ
 from contactsafe.policy.work import Work
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.posture import POSITION_TOLERANCE, find_posture, posture_rule
@@ -29,7 +28,7 @@ _TURN_RAD_S = 0.5
 """The tool is turned to where the work begins no faster than this."""
 
 _ELAPSED_S = 0.05
-"""Time that a step makes up for at most where steps came late."""
+"""Time that the way to the work makes up for at most where a step came late; an action is one step's however late."""
 
 _BLIND_STEPS = 600
 """Policy steps for which the arm waits for a camera that shows nothing new, ten seconds, before the run ends."""
@@ -81,7 +80,7 @@ class Actor(Unique):
         self.words, self.seen_words = as_words(self.message), as_words(self.seen)
         self.steps, self.waited, self.rounds, self.action = -1, 0, 0, np.zeros(18)
         self.done, self.blind, self.held_at = False, 0, np.zeros(3)
-        self.elapsed_s, self.seen_tick = 1.0 / POLICY_RATE_HZ, 0
+        self.elapsed_s, self.seen_tick = 0.0, 0
         self._warm_up()
 
     def _warm_up(self) -> None:
@@ -105,6 +104,8 @@ class Actor(Unique):
         if self.steps >= 0 and self.work.is_done():
             self.steps, self.waited, self.rounds = -1, 0, self.rounds + 1
             self.done = self.settings.rounds > 0 and self.rounds >= self.settings.rounds
+        elif self.steps >= 0 and self.work.is_stalled():
+            self.steps, self.waited = -1, 0
         if self.steps < 0 and self._travel() and self.work.is_ready():
             self.steps = 0
             self.policy.begin()
@@ -115,7 +116,7 @@ class Actor(Unique):
             self.steps += 1
         self._tell(number + 1)
         status["beat_policy"] += 1
-        self._record(began, number)
+        self._record(began, number, observed.get("force", self.seen[0]["force"]))
 
     def _waits_to_see(self) -> bool:
         """Hold the arm where it is while the camera shows what is past; end the run where that lasts."""
@@ -169,13 +170,13 @@ class Actor(Unique):
             message[name] = target[name]
         publish(self.exchange.targets, self.words)
 
-    def _record(self, began: int, step: int) -> None:
+    def _record(self, began: int, step: int, force: np.ndarray) -> None:
         status = self.exchange.status
         row = self.exchange.steps[int(status["steps_written"][0]) % STEPS]
         row["step"], row["of_tick"], row["stamp"] = step, self.seen[0]["tick"], time.time_ns()
         row["busy_ns"] = time.perf_counter_ns() - began
         row["frame_age_ms"], row["shown"] = self.work.seen_with()
-        row["pose"], row["force"], row["action"] = self.pose, self.seen[0]["force"], self.action
+        row["pose"], row["force"], row["action"] = self.pose, force, self.action
         status["steps_written"] += 1
         status["steps"] = step + 1
 

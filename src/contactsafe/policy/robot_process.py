@@ -56,6 +56,6 @@ def _follow(actor: Actor, exchange: Exchange) -> None:
             status["ready_policy"] = tick
             return
         status["ready_policy"] = tick
-        while due <= tick:  # a step that came late is left out, not made up for
+        while due <= tick:  # a step that came late is left out
             due += int(ticks_of_step(step))
             step += 1

@@ -56,6 +56,10 @@ class Work(Protocol):
         """Tell whether the work that was begun is done."""
         ...
 
+    def is_stalled(self) -> bool:
+        """Tell whether the work that was begun gets nowhere, and is better begun anew from the start."""
+        ...
+
     def seen_with(self) -> tuple[float, int]:
         """Return the age of the last picture, ms, and how many of its mask's pixels show something; NaN and 0."""
         ...

@@ -49,7 +49,7 @@ class Arm(Independent):
         home: a posture well inside the limits, (n,), rad.
         drag: viscous friction N m s/rad, constant torque N m and dry friction N m beside `friction`, (n, 3).
         friction_unknown: friction that the model does not know, viscous N m s/rad and dry N m, (n, 2): detection
-            allows for it, at rest too. By default nothing.
+            allows for it, at rest too, and most of it is overcome. By default nothing.
         sensor_friction, sensor_drag: what torque sensors behind the gears show beside the torque at the links, of the
             same form as friction and drag, (n, 3) each: a bias, hysteresis. By default nothing.
         description: what the model was generated from, or for a user's own what was derived from it; None where

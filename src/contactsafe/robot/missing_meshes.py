@@ -8,7 +8,7 @@ import mujoco
 
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.names import listed
-from contactsafe.robot.spec_parts import remove
+from contactsafe.robot.spec_parts import name_all, remove
 
 
 def find_meshes(spec: mujoco.MjSpec, findings: Findings) -> None:
@@ -38,14 +38,15 @@ def find_meshes(spec: mujoco.MjSpec, findings: Findings) -> None:
 
 
 def make_compilable(spec: mujoco.MjSpec) -> None:
-    """Edit a scene so that it compiles, and warn of what is left out.
+    """Edit a scene so that it compiles: meshes that lie elsewhere are pointed to, what is left out is warned of.
 
     Args:
-        spec: of the scene.
+        spec: of the scene; parts without a name get one.
 
     Raises:
         InvalidInputError: a body would lose its mass.
     """
+    name_all(spec)
     findings = Findings()
     find_meshes(spec, findings)
     findings.raise_problems()

@@ -6,7 +6,7 @@ import mujoco
 
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.robot.missing_meshes import make_compilable
-from contactsafe.robot.spec_parts import Flange, compiled_spec, name_all
+from contactsafe.robot.spec_parts import Flange, compiled_spec
 
 _HINGE, _FREE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_FREE)
 
@@ -26,7 +26,6 @@ def find_tool(spec: mujoco.MjSpec) -> tuple[Flange, list[str]]:
     Raises:
         InvalidInputError: there is no chain of two hinges.
     """
-    name_all(spec)
     make_compilable(spec)
     model = compiled_spec(spec, "the MjSpec")
     body, hinges = 0, list[int]()

@@ -24,6 +24,9 @@ _SMOOTHING = 0.5  # of the wrench, a policy step, as in training
 _WAITS_STEPS = 30
 """Policy steps between two pegs."""
 
+_STALLED_STEPS = 1200
+"""Policy steps, twenty seconds, after which a peg that is not in is lifted and tried anew."""
+
 
 class InsertionWork:
     """What the insertion task supplies for a real robot.
@@ -65,11 +68,11 @@ class InsertionWork:
         """Take the arm whose torques tell the wrench."""
         del lockstep
         self._arm, self._bias, self._wrench = arm, np.zeros(6), np.zeros(6)
-        self._depth, self._waited = 0.0, 0
+        self._depth, self._waited, self._steps = 0.0, 0, -1
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
         """Return offset, wrench and time, as in training; the wrench less what it was in the air."""
-        measured = self._tool_wrench(seen)
+        measured, self._steps = self._tool_wrench(seen), steps
         if steps < 0:
             self._waited += 1
         elif steps == 0:
@@ -98,8 +101,12 @@ class InsertionWork:
         return self._waited >= _WAITS_STEPS
 
     def is_done(self) -> bool:
-        """Tell whether the peg is in, or time is up."""
+        """Tell whether the peg is in."""
         return self._depth >= self._config.depth_m
+
+    def is_stalled(self) -> bool:
+        """Tell whether the peg has been searching for long."""
+        return self._steps > _STALLED_STEPS
 
     def seen_with(self) -> tuple[float, int]:
         """Return that nothing was seen."""

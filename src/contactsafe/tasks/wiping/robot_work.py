@@ -1,5 +1,6 @@
 """Wiping on a real robot: pictures of the board become masks, as in training, and ink says when there is work."""
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -30,8 +31,15 @@ _BLIND_MS = 150.0
 _REMEMBERED = 30
 """Postures of the last half second."""
 
-_TARE = 0.05
-"""Share of a step in what the tool is taken to be pressed with while it waits in the air: the last third of a second."""
+_AIR_LOOKS, _LEAST_AIR_LOOKS = 60, 20
+"""Looks in the air, at rest, whose median is what the tool is taken to be pressed with there; and without which no work
+begins."""
+
+_STALLED_LOOKS = 600
+"""Looks, ten seconds, without less ink than before after which the board is looked at anew from the start."""
+
+_REST_M = 2e-4
+"""A tool that moves by less between two looks is at rest."""
 
 _LEAST_PX = 3
 """A mask of fewer inked pixels shows none."""
@@ -101,17 +109,18 @@ class WipingWork:
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
-        self._tare_n = np.zeros(3)
+        self._least_px, self._no_less = math.inf, 0
+        self._air: deque[np.ndarray] = deque(maxlen=_AIR_LOOKS)
+        self._tare_n, self._was_at = np.zeros(3), np.zeros(3)
         self.pictures.open(lockstep)
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
         """Segment the newest picture; where the arm hides the board is known by its joints.
 
-        Force is what is more than in the air, where the tool waits and nobody pushes the arm. Where the board was
-        calibrated to lie elsewhere, the pose is given in the policy's frame, too.
+        Force is what is more than in the air, where the tool waited. Where the board was calibrated to lie elsewhere,
+        the pose is given in the policy's frame, too.
         """
-        if steps < 0 and seen["mode"] == FREE:
-            self._tare_n += _TARE * (seen["force"] - self._tare_n)
+        self._tare(seen, steps)
         picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
         self._past.append((float(seen["tick"]), seen["q"].copy()))
         if number != self._number:
@@ -122,10 +131,28 @@ class WipingWork:
             shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
             self._clean = 0 if shows else self._clean + 1
             self._inked = self._inked + 1 if shows else 0
+        self._follow_progress(steps)
         observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
         return observed
+
+    def _follow_progress(self, steps: int) -> None:
+        """Count the looks since the least ink of this work was seen."""
+        shown = int(np.count_nonzero(self._mask == 0))
+        less = shown < self._least_px
+        self._least_px = shown if less or steps <= 0 else self._least_px
+        self._no_less = 0 if less or steps <= 0 else self._no_less + 1
+
+    def _tare(self, seen: np.void, steps: int) -> None:
+        """Remember the force in the air, as a force sensor is zeroed; a push of less than half a second is none."""
+        rests = math.dist(seen["position"], self._was_at) < _REST_M
+        self._was_at = seen["position"].copy()
+        if steps < 0 and rests and seen["mode"] == FREE:
+            self._air.append(seen["force"].copy())
+        elif steps >= 0 and self._air:
+            self._tare_n = np.median(self._air, axis=0)
+            self._air.clear()
 
     def _posture_at(self, tick: float) -> np.ndarray:
         """Return where the joints were when a picture was taken, (n,), rad: the arm in it is where it was then."""
@@ -139,12 +166,16 @@ class WipingWork:
         return self._age_ms > _BLIND_MS
 
     def is_ready(self) -> bool:
-        """Tell whether ink is seen."""
-        return self._inked >= _INKED_LOOKS
+        """Tell whether ink is seen, and what the tool weighs in the air is known."""
+        return self._inked >= _INKED_LOOKS and len(self._air) >= _LEAST_AIR_LOOKS
 
     def is_done(self) -> bool:
         """Tell whether no ink has been seen for a while."""
         return self._clean >= _CLEAN_LOOKS
+
+    def is_stalled(self) -> bool:
+        """Tell whether there has been no less ink for long: a policy that remembers nothing may go round in circles."""
+        return self._no_less > _STALLED_LOOKS
 
     def seen_with(self) -> tuple[float, int]:
         """Return the picture's age and how much ink its mask shows."""
