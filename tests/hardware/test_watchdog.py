@@ -136,6 +136,16 @@ def test_a_command_that_is_gone_ends_the_run(scene):
     assert scene.stop == states.COMMAND_DEAD
 
 
+def test_a_command_that_took_seconds_to_start_its_processes_ended_the_run(scene):
+    """Each process reads what the user's program imports; the watchdog is there before the others."""
+    scene.beats.remove("beat_command")
+    scene.look()
+    scene.look(30.0)
+    assert scene.stop == 0
+    scene.look(130.0)
+    assert scene.stop == states.COMMAND_DEAD
+
+
 def test_a_control_process_that_does_not_let_go_is_ended(scene):
     scene.look()
     scene.exchange.ask_to_stop(states.ASKED)

@@ -24,8 +24,9 @@ _EVERY_S = 0.01
 _STUCK_S, _SILENT_S = 0.1, 0.3
 """The control loop stands still after so long without a beat, or the robot is silent."""
 
-_COMMAND_S = 2.0
-"""The command that began the run is gone after so long without a beat."""
+_COMMAND_S, _FIRST_S = 2.0, 120.0
+"""The command that began the run is gone after so long without a beat, or without a first one: each process that it
+starts reads whatever the user's program imports."""
 
 _LET_GO_S, _END_S = 5.0, 3.0
 """A control process that does not let go of the robot within the first is ended, and the others, once that is done,
@@ -67,7 +68,8 @@ class Watchdog(Unique):
         status, now = self.exchange.status, time.monotonic()
         status["beat_watchdog"] += 1
         self._adopt()
-        if self._beats.silent_for("command", int(status["beat_command"][0])) > _COMMAND_S:
+        beat = int(status["beat_command"][0])
+        if self._beats.silent_for("command", beat) > (_COMMAND_S if beat else _FIRST_S):
             self.exchange.ask_to_stop(COMMAND_DEAD)
         if self._is_dead("policy") and not status["finished"][0]:
             self.exchange.ask_to_stop(POLICY_DEAD)

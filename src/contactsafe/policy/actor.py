@@ -28,7 +28,7 @@ _TURN_RAD_S = 0.5
 """The tool is turned to where the work begins no faster than this."""
 
 _ELAPSED_S = 0.05
-"""Time that the way to the work makes up for at most where a step came late; an action is one step's however late."""
+"""Time that travel makes up for at most where a step came late; an action is that of one step, however late."""
 
 _BLIND_STEPS = 600
 """Policy steps for which the arm waits for a camera that shows nothing new, ten seconds, before the run ends."""

@@ -166,7 +166,7 @@ class WipingWork:
         return self._age_ms > _BLIND_MS
 
     def is_ready(self) -> bool:
-        """Tell whether ink is seen, and what the tool weighs in the air is known."""
+        """Tell whether ink is seen, and the force in the air is known."""
         return self._inked >= _INKED_LOOKS and len(self._air) >= _LEAST_AIR_LOOKS
 
     def is_done(self) -> bool:
