@@ -110,18 +110,24 @@ def test_small_errors_are_met_with_no_more_than_the_loops_delay_allows(stiffness
     assert _gain(K, D, delay_s) == gain
 
 
+def commanded(arm, mode, offset):
+    """Return the torque of the first tick in a mode that asks for the home pose moved by an offset, (n,), N m."""
+    plant, controller = Plant(arm), controller_at(arm, SAFE)
+    plant.run(controller, hold(arm), 5, UNTOUCHED)
+    state = controller.record["state"]
+    state["mode"], state["detection"]["quiet_ticks"], state["detection"]["contact_ticks"] = mode, 0, 0
+    return controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), reach(arm, offset)).torque
+
+
 def test_nothing_is_added_while_something_touches_the_arm(panda):
     """Friction acts against what is pushed then, not against the task: arms with friction were moved further."""
-    arm, asked = declared(panda, 3.0), {}
-    for mode in (FREE, COMPLY):
-        controller = controller_at(arm, SAFE)
-        plant = Plant(arm)
-        plant.run(controller, hold(arm), 5, UNTOUCHED)
-        controller.record["state"]["mode"] = mode
-        controller.record["state"]["detection"]["quiet_ticks"] = 0
-        out = controller.step(Measurement(plant.q, plant.qd, UNTOUCHED), reach(arm, [0.0, 0.02, 0.0]))
-        asked[mode] = np.abs(out.torque - arm.dynamics(plant.q, plant.qd)["g"]).max()
-    assert asked[COMPLY] < asked[FREE]
+    offset = [0.0, 0.002, 0.0]
+    sticks, smooth = declared(panda, 3.0), declared(panda, 0.0)
+    added = {mode: commanded(sticks, mode, offset) - commanded(smooth, mode, offset) for mode in (FREE, COMPLY)}
+    asked = commanded(smooth, COMPLY, offset) - commanded(smooth, COMPLY, [0.0, 0.0, 0.0])
+    assert np.abs(added[FREE]).max() > 0.1
+    assert np.abs(asked).max() > 0.1  # of which a multiple would be added
+    assert np.abs(added[COMPLY]).max() < 1e-9
 
 
 def test_arm_that_holds_still_and_has_the_friction_stays(panda):

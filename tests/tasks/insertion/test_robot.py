@@ -64,6 +64,18 @@ def test_a_peg_at_depth_is_done_and_the_next_one_waits(arm):
     assert not work.is_done()
 
 
+def test_a_peg_that_searched_for_long_is_lifted_and_tried_anew(arm):
+    work = InsertionWork(InsertionConfig())
+    work.prepare(arm, False)
+    seen = seen_at(arm, np.zeros(6))
+    work.look(seen, np.zeros(6), 1000)
+    assert not work.is_stalled()
+    work.look(seen, np.zeros(6), 1300)
+    assert work.is_stalled()
+    work.look(seen, np.zeros(6), -1)
+    assert not work.is_stalled()
+
+
 def test_the_block_moves_once_a_peg_was_in_and_is_out_again():
     config, rounds = InsertionConfig(), 2
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='block'/></worldbody></mujoco>")
