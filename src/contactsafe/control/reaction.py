@@ -134,8 +134,7 @@ def damp_contact(
     if mode == REJECT:
         _keep_out_of_task(N_t, qd, scale, scaled)
     for i in range(n):
-        damping[i] -= params.null_damping * (in_null[i] - beside_contact[i])
-        damping[i] -= params.contact_damping * scaled[i]
+        damping[i] -= params.null_damping * (in_null[i] - beside_contact[i]) + params.contact_damping * scaled[i]
 
 
 @inlined

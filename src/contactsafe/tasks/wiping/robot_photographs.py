@@ -34,6 +34,9 @@ D455 = Lens(WIDTH, HEIGHT, 639.0, 639.0, 639.5, 359.5, (-0.056, 0.065, 0.0, 0.0,
 _EVERY_TICKS = 33
 """Thirty pictures a second."""
 
+_GIVES_WAY = 10
+"""By which whoever draws is nicer than control and policy: a real camera takes nothing from their processors."""
+
 _WAIT_MS = 200
 _READY_S = 120.0
 _NAP_S = 0.002
@@ -108,6 +111,7 @@ def draw_pictures(subject: Subject) -> None:
     """Be the camera of a run, in a process of its own, until whoever began it has ended."""
     ignore_terminal()
     keep_to_one_thread()
+    os.nice(_GIVES_WAY)
     parent, drawing, number = os.getppid(), Drawing(subject), -1
     shown = drawing.shown[0]
     while os.getppid() == parent:
@@ -164,11 +168,15 @@ class PhotographedBoard:
             time.sleep(_NAP_S)
 
     def latest(self, tick: int) -> tuple[np.ndarray, int, float]:
-        """Return the newest picture; in lockstep it is taken where the time for one has come."""
+        """Return the newest picture; in lockstep it is taken where the time for one has come.
+
+        By the clock its age is counted in the simulator's ticks: control has fewer, by the states that it lost.
+        """
         number = tick // _EVERY_TICKS if self._drawing else int(self._shown["taken"].max()) - 1
         if number not in (self._number, -1):
             self._take(number, tick)
-        return self._photo, self._number, float(max(tick - self._tick, 0))
+        now = tick if self._drawing else int(self._shown["tick"][0])
+        return self._photo, self._number, float(now - self._tick)
 
     def _take(self, number: int, tick: int) -> None:
         """Hand a picture to the device, and take it from there as that of a real one."""
