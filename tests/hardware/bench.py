@@ -1,5 +1,7 @@
 """A robot of this process alone, and a control loop that runs on it, tick by tick, whatever a test does in between."""
 
+import time
+
 import numpy as np
 
 from contactsafe.control import presets
@@ -27,6 +29,7 @@ class FakeRobot:
         self.q, self.qd, self.time = arm.home.copy(), np.zeros(arm.n), 0.0
         self.motor, self.push, self.ticks = arm.dynamics(self.q, self.qd)["g"].copy(), np.zeros(arm.n), 0
         self.sent, self.calls, self.told = [], [], ()
+        self.arrived_ns = 0
 
     def connect(self):
         self.calls.append("connect")
@@ -40,6 +43,7 @@ class FakeRobot:
     def read(self, reading):
         self.ticks += 1
         self.on_tick(self.ticks)
+        self.arrived_ns = time.perf_counter_ns()
         dynamics = self.arm.dynamics(self.q, self.qd)
         qdd = dynamics["M_inv"] @ (self.motor + self.push - dynamics["c"] - dynamics["g"])
         self.qd = self.qd + 1e-3 * qdd

@@ -1,5 +1,7 @@
 """The control loop on a robot of this process: what it sends, and how each fault ends."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,20 @@ def test_every_step_of_the_torque_keeps_to_nine_tenths_of_the_robots_rate(bench)
     assert np.abs(steps).max() <= 0.9 + 1e-9
     assert one.status["first_step_nm"] <= 0.9
     assert one.status["largest_step_nm"] == pytest.approx(np.abs(steps[1:]).max())
+
+
+def test_busy_counts_from_the_arrival_of_a_state_its_conversion_included(bench):
+    one = bench()
+    fill = one.robot._fill
+
+    def slowly(reading):
+        time.sleep(0.0015)
+        fill(reading)
+
+    one.robot._fill = slowly
+    one.run(50)
+    assert one.status["busy"][:1500].sum() == 0
+    assert one.status["busy"].sum() >= 50
 
 
 def test_a_target_is_followed(bench):

@@ -127,7 +127,7 @@ def _table(runs: Sequence[RobotRun]) -> Table:
     rows += _histogram(runs)
     return Table(
         "runs", "How the runs went", ("figure", *(run.controller for run in runs)), tuple(rows),
-        note="Busy: from the robot's state to its command, what the loop takes of a tick.",
+        note="Busy: from the arrival of the robot's state to its command, what the loop takes of a tick.",
     )  # fmt: skip
 
 

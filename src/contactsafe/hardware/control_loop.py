@@ -147,13 +147,12 @@ class ControlLoop(Unique):
             waits[0] = 1
             passed = port.read(reading)
             waits[0] = 0
-            began = clock()
             stamp[0] = wall()
             turn(*arguments)
             if lockstep:
                 self._wait_for_policy()
             port.write(sent)
-            busy_ns[0] = spent = clock() - began
+            busy_ns[0] = spent = clock() - port.arrived_ns
             busy[min(spent // 1000, BUSY_BINS - 1)] += 1
             if passed > 1 and ticks[0] > 1:
                 lost[0] += passed - 1

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import time
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,7 @@ class FrankaPort:
         self._into: dict[str, np.ndarray] = {}
         self._filled: np.ndarray | None = None
         self._first_ms: int | None = None
+        self.arrived_ns = 0
         self.torque_rate = np.full(7, _RATE_NM)
 
     @property
@@ -91,6 +93,7 @@ class FrankaPort:
             state, passed = self._control.readOnce()
         except Exception as error:
             raise as_ours(self._library, error) from None
+        self.arrived_ns = time.perf_counter_ns()
         self._fill(reading, state)
         return round(1000.0 * passed.to_sec())
 

@@ -6,6 +6,7 @@ Nobody here has tried it on a wire, and no simulator speaks that protocol: tests
 import functools
 import queue
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ class PandaPort(FrankaPort):
             raise RobotSilentError((), f"no state for {_SILENT_S:g} s") from None
         if isinstance(found, Exception):
             raise as_ours(self._library, found) from None
+        self.arrived_ns = time.perf_counter_ns()
         state, passed = found
         self._fill(reading, state)
         return round(1000.0 * passed.to_sec())

@@ -33,6 +33,9 @@ class RobotPort(Protocol):
     torque_rate: np.ndarray
     """Most that the robot lets each joint's torque change in a tick, (n,), N m."""
 
+    arrived_ns: int
+    """When the state that was read last came, by `time.perf_counter_ns`: what is done with it counts from here."""
+
     def connect(self) -> None:
         """Reach the robot and prepare it; it does not move. Raises `RobotError`."""
         ...

@@ -5,6 +5,7 @@ reports is measured behind the gears, friction and rotor inertia before the sens
 friction is taken off by a torque loop, as a Franka's own does.
 """
 
+import contextlib
 import os
 import select
 import time
@@ -29,6 +30,7 @@ _BEHIND_S = 0.02  # more than this behind, it starts counting anew instead of ca
 _PATIENCE_S = 30.0  # for a command, in lockstep
 _AGAIN_S = 0.2  # after so long without a first command a state is sent again: libfranka skips all but the newest
 _FRICTION = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
+_PRIORITY = 40  # of SCHED_FIFO, below control's: a robot's own computer is not kept waiting by programs of this one
 _UNTIL_ALONE = 100  # ticks between looks whether whoever began this still lives
 
 truth_dtype = np.dtype(
@@ -258,6 +260,9 @@ def serve(
         told.send(str(error))
         return
     told.send(f"ready {robot.address}")
+    if not lockstep:
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     due, turns = time.perf_counter(), 0
     while True:
         robot.tick(lockstep)
