@@ -69,6 +69,12 @@ def test_what_is_no_urdf_is_told_in_one_line(tmp_path, content, text):
     assert "\n" not in str(caught.value)
 
 
+def test_a_call_without_a_link_is_told_those_that_there_are(tmp_path):
+    (tmp_path / "arm.urdf").write_text('<robot name="a"><link name="b"/><link name="c"/></robot>', encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=r"^no link is named; give one of b, c$"):
+        robots.from_urdf(tmp_path / "arm.urdf")
+
+
 def test_a_file_that_is_not_there_is_told(tmp_path):
     with pytest.raises(InvalidInputError, match="is no URDF that can be read"):
         robots.from_urdf(tmp_path / "none.urdf", "tcp")

@@ -11,21 +11,29 @@ SENSOR, BODY = mujoco.mjtObj.mjOBJ_SENSOR, mujoco.mjtObj.mjOBJ_BODY
 _LISTED = 12  # names that a message lists
 
 
-def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str | None) -> int:
     """Return the number of a named thing.
 
     Raises:
-        InvalidInputError: there is none of that name.
+        InvalidInputError: there is none of that name, or none was named.
     """
-    found = mujoco.mj_name2id(model, kind, str(name))
+    found = -1 if name is None else mujoco.mj_name2id(model, kind, str(name))
     if found < 0:
         word = kind.name.removeprefix("mjOBJ_").lower()
         count = {JOINT: model.njnt, SITE: model.nsite, ACTUATOR: model.actuator_trntype.size, SENSOR: model.nsensor}[
             kind
         ]
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-        raise InvalidInputError(f"{word} '{name}' is not in the model; give one of: {listed(filter(None, names))}")
+        what = f"no {word} is named" if name is None else f"{word} '{name}' is not in the model"
+        remedy = f"give one of: {listed(filter(None, names))}" + (_or_flange(model) if kind == SITE else "")
+        raise InvalidInputError(f"{what}; {remedy}")
     return found
+
+
+def _or_flange(model: mujoco.MjModel) -> str:
+    """Return the other remedy where a site is missing, if the bodies have names."""
+    bodies = [name for i in range(1, model.nbody) if (name := mujoco.mj_id2name(model, BODY, i))]
+    return f"; or make one by robots.Flange(BODY), on one of: {listed(bodies)}" if bodies else ""
 
 
 def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:

@@ -54,7 +54,7 @@ def compiled_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
         raise InvalidInputError(f"MuJoCo cannot read {what}: {reason}; mend the file") from None
 
 
-def add_flange(spec: mujoco.MjSpec, site: str | Flange) -> str:
+def add_flange(spec: mujoco.MjSpec, site: str | Flange | None) -> str | None:
     """Return a site's name, made first where a `Flange` is given.
 
     Raises:

@@ -60,7 +60,11 @@ def make_torque_driven(
 
 
 def torque_driven_copy(
-    spec: mujoco.MjSpec, site: str | Flange, joints: Sequence[str] | None, tau_max: ArrayLike | None, findings: Findings
+    spec: mujoco.MjSpec,
+    site: str | Flange | None,
+    joints: Sequence[str] | None,
+    tau_max: ArrayLike | None,
+    findings: Findings,
 ) -> tuple[mujoco.MjSpec, str]:
     """Return a scene as `make_torque_driven` edits it, as far as its problems let it, and the site's name.
 
@@ -76,7 +80,11 @@ def torque_driven_copy(
 
 
 def _examine(
-    spec: mujoco.MjSpec, site: str | Flange, joints: Sequence[str] | None, tau_max: ArrayLike | None, findings: Findings
+    spec: mujoco.MjSpec,
+    site: str | Flange | None,
+    joints: Sequence[str] | None,
+    tau_max: ArrayLike | None,
+    findings: Findings,
 ) -> tuple[str, mujoco.MjModel, list[int], np.ndarray]:
     """Return site, compiled scene, joints and torque limits; parts get names, and missing meshes are taken off."""
     name_all(spec)

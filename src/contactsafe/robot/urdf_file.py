@@ -43,12 +43,13 @@ def urdf_spec(path: str | os.PathLike, link: str) -> tuple[mujoco.MjSpec, str]:
     return spec, site
 
 
-def read_urdf(path: str | os.PathLike, link: str, findings: Findings) -> tuple[mujoco.MjSpec, str]:
+def read_urdf(path: str | os.PathLike, link: str | None, findings: Findings) -> tuple[mujoco.MjSpec, str]:
     """Read a URDF as `urdf_spec` does, and tell `findings` of missing meshes."""
     root = robot_of(path)
     names = [one.get("name", "") for one in root.findall("link")]
     if link not in names:
-        raise InvalidInputError(f"{os.fspath(path)} has no link {shown(link)}; give one of {listed(names)}")
+        what = "no link is named" if link is None else f"{os.fspath(path)} has no link {shown(link)}"
+        raise InvalidInputError(f"{what}; give one of {listed(names)}")
     site = link if link not in {joint.get("name") for joint in root.findall("joint")} else f"{link}_frame"
     _keep_what_collides(root, pathlib.Path(path), findings)
     try:

@@ -63,7 +63,7 @@ class ArmOptions(TypedDict, total=False):
 
 def from_mjcf(
     scene: str | os.PathLike | mujoco.MjModel | mujoco.MjSpec,
-    site: str | Flange,
+    site: str | Flange | None = None,
     joints: Sequence[str] | None = None,
     **options: Unpack[ArmOptions],
 ) -> Arm:
@@ -77,7 +77,8 @@ def from_mjcf(
 
     Args:
         scene: path of the MJCF file, its `MjSpec`, which stays as it is, or the model compiled from it.
-        site: end-effector point, its axes are the tool's; or a `Flange` to make one, but in a compiled model.
+        site: end-effector point, its axes are the tool's; or a `Flange` to make one, but in a compiled model. Without
+            it the error names those that there are.
         joints: names of the arm's hinges from base to tip; None for all that move the site, if each has an actuator.
         **options: see `ArmOptions`.
 
@@ -107,7 +108,7 @@ def from_mjcf(
 
 
 def arm_in(
-    model: mujoco.MjModel, site: str, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
+    model: mujoco.MjModel, site: str | None, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
 ) -> Arm:
     """Return the arm in a compiled scene, and tell what was found; see `from_mjcf`."""
     site_id, torque = find(model, SITE, site), options.get("actuators") is not None
@@ -210,7 +211,7 @@ def _joints(
     )
 
 
-def _site_of(site: str | Flange) -> str:
+def _site_of(site: str | Flange | None) -> str | None:
     if isinstance(site, Flange):
         raise InvalidInputError(
             "a compiled MjModel takes no more sites; give the path or the MjSpec with the Flange, or a site's name"

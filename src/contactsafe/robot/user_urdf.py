@@ -15,7 +15,10 @@ from contactsafe.robot.user_mjcf import ArmOptions, arm_in, refuse_options
 
 
 def from_urdf(
-    path: str | os.PathLike, link: str, joints: Sequence[str] | None = None, **options: Unpack[ArmOptions]
+    path: str | os.PathLike,
+    link: str | None = None,
+    joints: Sequence[str] | None = None,
+    **options: Unpack[ArmOptions],
 ) -> Arm:
     """Return the arm inside a user's own URDF.
 
@@ -25,7 +28,7 @@ def from_urdf(
 
     Args:
         path: of the URDF.
-        link: whose frame is the end-effector point.
+        link: whose frame is the end-effector point; without it the error names those that there are.
         joints: names of the arm's revolute joints from base to tip; None for all that move the link.
         **options: as of `from_mjcf`; `actuators` makes no difference.
 

@@ -30,7 +30,7 @@ _BEHIND_S = 0.02  # more than this behind, it starts counting anew instead of ca
 _PATIENCE_S = 30.0  # for a command, in lockstep
 _AGAIN_S = 0.2  # after so long without a first command a state is sent again: libfranka skips all but the newest
 _FRICTION = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
-_PRIORITY = 40  # of SCHED_FIFO, below control's: a robot's own computer is not kept waiting by programs of this one
+_NICE = -10  # a robot's own computer waits for no program of this one; SCHED_FIFO is stopped where it takes it all
 _UNTIL_ALONE = 100  # ticks between looks whether whoever began this still lives
 
 truth_dtype = np.dtype(
@@ -262,7 +262,7 @@ def serve(
     told.send(f"ready {robot.address}")
     if not lockstep:
         with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+            os.setpriority(os.PRIO_PROCESS, 0, _NICE)
     due, turns = time.perf_counter(), 0
     while True:
         robot.tick(lockstep)
