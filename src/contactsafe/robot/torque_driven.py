@@ -92,8 +92,9 @@ def _examine(
     findings.raise_problems()
     name = add_flange(spec, site)
     model = compiled_spec(spec, "the MjSpec")
-    chain = choose_chain(model, find(model, SITE, name), joints, findings, many=True)
-    return name, model, chain, torque_limits(model, chain, tau_max, findings)
+    site_id = find(model, SITE, name)
+    chain = choose_chain(model, site_id, joints, findings, many=True)
+    return model.site(site_id).name, model, chain, torque_limits(model, chain, tau_max, findings)
 
 
 def _edit(spec: mujoco.MjSpec, model: mujoco.MjModel, chain: list[int], limits: np.ndarray, timestep: float) -> None:

@@ -17,8 +17,9 @@ from contactsafe.tasks.wiping.drawings import Boards, paint_board
 from contactsafe.tasks.wiping.whiteboard import INK, Whiteboard, erase_under_pad
 
 _ERASE_EVERY = 8  # ticks
-_AWAY_M, _AWAY_TICKS = 0.04, 500
-"""A clean board is drawn on once the tool has been this far above it for so long."""
+_AWAY_M, _AWAY_TICKS, _LEFT_TICKS = 0.04, 500, 10_000
+"""A clean board is drawn on once the tool has been this far above it for so long; one that is not, for ten seconds:
+the robot has taken it for clean."""
 
 _MOST = 64  # boards of a run
 
@@ -116,9 +117,9 @@ class WipedBoard:
             self._draw(int(shown["number"]) + 1)
 
     def _is_drawn_on(self, tick: int, number: int) -> bool:
-        """Tell whether somebody draws now: once the arm is away from a board that is clean, as far as one sees."""
+        """Tell whether somebody draws now: once the arm is away from a board that is clean, or has left it for long."""
         if number < 0:
             return tick >= self._first_tick
         shown = self._shown[0]
         clean = shown["ink"][number] <= 0.05 * shown["ink_start"][number]
-        return bool(clean and self._away > _AWAY_TICKS and number + 1 < self._rounds)
+        return bool(self._away > (_AWAY_TICKS if clean else _LEFT_TICKS) and number + 1 < self._rounds)

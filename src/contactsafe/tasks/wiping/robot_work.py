@@ -41,8 +41,9 @@ _STALLED_LOOKS = 600
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
 
-_LEAST_PX = 3
-"""A mask of fewer inked pixels shows none."""
+_LEAST_PX, _SPECK_LOOKS = 3, 90
+"""Fewer inked pixels than this may be specks: they are no reason to begin, and work on nothing else ends after so many
+new pictures."""
 
 
 class Pictures(Protocol):
@@ -108,7 +109,8 @@ class WipingWork:
         self._segmenter = Segmenter(self._eye.homography, corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
-        self._number, self._age_ms, self._clean, self._inked = -1, float("nan"), 0, 0
+        self._number, self._age_ms = -1, float("nan")
+        self._spotless, self._clean, self._inked = 0, 0, 0
         self._least_px, self._no_less = math.inf, 0
         self._air: deque[np.ndarray] = deque(maxlen=_AIR_LOOKS)
         self._tare_n, self._was_at = np.zeros(3), np.zeros(3)
@@ -128,7 +130,9 @@ class WipingWork:
             solids = self._eye.solids_at(self._posture_at(float(seen["tick"]) - self._age_ms))
             hidden = self._eye.hidden(solids) if self._view is None else self._view.hidden(solids)
             self._mask = self._segmenter.segment(picture, hidden)
-            shows = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX
+            inked_px = int(np.count_nonzero(self._mask == 0))
+            shows = inked_px >= _LEAST_PX
+            self._spotless = 0 if inked_px > 0 else self._spotless + 1
             self._clean = 0 if shows else self._clean + 1
             self._inked = self._inked + 1 if shows else 0
         self._follow_progress(steps)
@@ -170,8 +174,8 @@ class WipingWork:
         return self._inked >= _INKED_LOOKS and len(self._air) >= _LEAST_AIR_LOOKS
 
     def is_done(self) -> bool:
-        """Tell whether no ink has been seen for a while."""
-        return self._clean >= _CLEAN_LOOKS
+        """Tell whether no ink has been seen for a while, or nothing but specks for longer."""
+        return self._spotless >= _CLEAN_LOOKS or self._clean >= _SPECK_LOOKS
 
     def is_stalled(self) -> bool:
         """Tell whether there has been no less ink for long: a policy that remembers nothing may go round in circles."""
