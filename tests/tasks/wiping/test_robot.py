@@ -146,8 +146,8 @@ def test_work_begins_with_ink_ends_without_and_needs_sight(arm):
     assert work.is_done()
     assert not work.is_ready()
     speck = white.copy()
-    speck[200:204, 201:205] = 20
-    look(speck, 60)  # too small to begin with, but what has been begun is gone on with for a while
+    speck[200:203, 200:202] = 20
+    look(speck, 50)  # too small to begin with, but what has been begun is gone on with for a while
     assert 0 < work.seen_with()[1] < 3
     assert not work.is_done()
     assert not work.is_ready()
@@ -184,8 +184,43 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
     assert not work.is_stalled()
     look(120, 801, 400)
     assert work.is_stalled()
-    look(120, -1, 1)
+    look(0, -1, 200)  # from the start the arm hides it
     assert not work.is_stalled()
+    assert work.is_ready()
+    look(0, 0, 1)
+    look(0, 1, 30)
+    assert work.is_done()
+    look(0, -1, 200)
+    assert not work.is_ready()
+
+
+def test_ink_that_the_arm_hides_is_ink_until_it_is_seen_to_be_gone(arm):
+    """From the start the arm hides a part of the board; six per cent of the ink were left behind it."""
+    white = np.full((455, 455, 3), 220, np.uint8)
+    inked, pictures = white.copy(), Shown(white)
+    inked[200:206, 200:260] = 20
+    work = WipingWork(pictures)
+    work.prepare(arm, False)
+    seen, hides = np.zeros(1, seen_dtype(7))[0], np.zeros((455, 455), np.uint8)
+    seen["q"] = arm.home
+    work._eye.hidden = lambda solids: hides
+
+    def look(photo, hidden, steps, times):
+        hides[:] = 0
+        hides[190:215, 190:270] = 255 * hidden
+        for _ in range(times):
+            pictures.photo, pictures.number = photo, pictures.number + 1
+            work.look(seen, np.zeros(6), steps)
+
+    look(inked, False, -1, 10)
+    look(inked, False, 0, 5)
+    look(inked, True, 5, 40)
+    assert not work.is_done()
+    look(white, False, 45, 25)
+    assert work.is_done()
+    look(inked, False, 70, 5)
+    look(inked, True, 75, 100)
+    assert work.is_done()  # it does not wait for ever
 
 
 def test_force_is_what_is_more_than_in_the_air(arm):

@@ -23,7 +23,8 @@ _START_M = 0.06
 """Above the board's middle."""
 
 _CLEAN_LOOKS, _INKED_LOOKS = 20, 6
-"""New pictures in a row without ink after which a board is clean, and with ink after which there is work."""
+"""New pictures in a row without ink, seen or last seen behind the arm, after which a board is clean; and with ink after
+which there is work."""
 
 _BLIND_MS = 150.0
 """The arm is held where the newest picture is older: it has stopped, or the camera is unplugged."""
@@ -42,8 +43,8 @@ _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
 
 _LEAST_PX, _SPECK_LOOKS = 3, 90
-"""Fewer inked pixels than this may be specks: they are no reason to begin, and work on nothing else ends after so many
-new pictures."""
+"""Fewer inked pixels than this may be specks: they are no reason to begin. Work on nothing else, or on what was last
+seen where the arm is now, ends after so many new pictures."""
 
 
 class Pictures(Protocol):
@@ -109,9 +110,10 @@ class WipingWork:
         self._segmenter = Segmenter(self._eye.homography, corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
+        self._inked_when_seen = np.zeros(self._mask.shape, bool)
         self._number, self._age_ms = -1, float("nan")
         self._spotless, self._clean, self._inked = 0, 0, 0
-        self._least_px, self._no_less = math.inf, 0
+        self._least_px, self._no_less, self._unfinished = math.inf, 0, False
         self._air: deque[np.ndarray] = deque(maxlen=_AIR_LOOKS)
         self._tare_n, self._was_at = np.zeros(3), np.zeros(3)
         self.pictures.open(lockstep)
@@ -130,16 +132,21 @@ class WipingWork:
             solids = self._eye.solids_at(self._posture_at(float(seen["tick"]) - self._age_ms))
             hidden = self._eye.hidden(solids) if self._view is None else self._view.hidden(solids)
             self._mask = self._segmenter.segment(picture, hidden)
-            inked_px = int(np.count_nonzero(self._mask == 0))
-            shows = inked_px >= _LEAST_PX
-            self._spotless = 0 if inked_px > 0 else self._spotless + 1
-            self._clean = 0 if shows else self._clean + 1
-            self._inked = self._inked + 1 if shows else 0
+            self._count(self._segmenter.seen(hidden), steps)
         self._follow_progress(steps)
         observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
         return observed
+
+    def _count(self, seen: np.ndarray, steps: int) -> None:
+        """Count pictures with ink and without; what the arm hides is as it was when last seen in this work."""
+        inked = self._mask == 0
+        self._inked_when_seen = inked | (self._inked_when_seen & ~seen & (steps >= 0))
+        shows = int(np.count_nonzero(inked)) >= _LEAST_PX
+        self._spotless = 0 if self._inked_when_seen.any() else self._spotless + 1
+        self._clean = 0 if shows else self._clean + 1
+        self._inked = self._inked + 1 if shows else 0
 
     def _follow_progress(self, steps: int) -> None:
         """Count the looks since the least ink of this work was seen."""
@@ -147,6 +154,7 @@ class WipingWork:
         less = shown < self._least_px
         self._least_px = shown if less or steps <= 0 else self._least_px
         self._no_less = 0 if less or steps <= 0 else self._no_less + 1
+        self._unfinished = self.is_stalled() if steps > 0 else self._unfinished
 
     def _tare(self, seen: np.void, steps: int) -> None:
         """Remember the force in the air, as a force sensor is zeroed; a push of less than half a second is none."""
@@ -170,11 +178,11 @@ class WipingWork:
         return self._age_ms > _BLIND_MS
 
     def is_ready(self) -> bool:
-        """Tell whether ink is seen, and the force in the air is known."""
-        return self._inked >= _INKED_LOOKS and len(self._air) >= _LEAST_AIR_LOOKS
+        """Tell whether ink is seen, or was left behind the arm, and the force in the air is known."""
+        return (self._inked >= _INKED_LOOKS or self._unfinished) and len(self._air) >= _LEAST_AIR_LOOKS
 
     def is_done(self) -> bool:
-        """Tell whether no ink has been seen for a while, or nothing but specks for longer."""
+        """Tell whether no ink has been left for a while, or none been seen but specks for longer."""
         return self._spotless >= _CLEAN_LOOKS or self._clean >= _SPECK_LOOKS
 
     def is_stalled(self) -> bool:
