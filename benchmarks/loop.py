@@ -30,19 +30,29 @@ def turns_us(pause: Callable[[], None]) -> np.ndarray:
     from contactsafe.hardware.exchange import Exchange
     from contactsafe.hardware.franka_port import FrankaPort
     from contactsafe.hardware.loop import turn
+    from contactsafe.hardware.mailbox import publish
+    from contactsafe.hardware.messages import as_words, message_dtype
+    from contactsafe.hardware.states import RUNNING
 
     arm = cs.robots.fr3("wiper")
-    exchange = Exchange.create(arm.n)
+    exchange, message = Exchange.create(arm.n), np.zeros(1, message_dtype(arm.n))
+    pose = arm.tool_pose(arm.home)
+    message["position"], message["quat"], message["q_posture"], message["joints"] = *pose, arm.home, arm.n
+    message["K_task"], message["D_task"] = [150.0] * 3 + [450.0] * 3, [24.0] * 3 + [42.0] * 3
     try:
         loop = ControlLoop(ControlSettings(arm, cs.presets.safe(), FrankaPort("127.0.0.1")), exchange)
         spent = np.zeros(TURNS)
         for k in range(TURNS):
             loop._reading["time"] += 0.001
             exchange.status["beat_watchdog"] += 1
+            if k % 16 == 1:
+                message["number"], message["of_tick"] = k, exchange.status["tick"]
+                publish(exchange.targets, as_words(message))
             pause()
             began = time.perf_counter_ns()
             turn(*loop._arguments)
             spent[k] = (time.perf_counter_ns() - began) / 1000.0
+        assert exchange.status["state"][0] == RUNNING
     finally:
         exchange.unlink()
     return spent[TURNS // 10 :]

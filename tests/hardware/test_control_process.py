@@ -5,7 +5,8 @@ import signal
 
 import pytest
 
-from contactsafe.hardware import states
+from contactsafe.hardware import company, states
+from contactsafe.hardware.control_process import control
 from contactsafe.hardware.port import RobotError, RobotSilentError
 
 
@@ -57,11 +58,18 @@ def test_a_run_that_is_called_off_before_it_begins_never_takes_the_robot(bench):
     one = bench()
     one.exchange.status["stop"] = states.ASKED
     one.exchange.status["go"] = 0
-    from contactsafe.hardware.control_process import control
-
     control(str(one.exchange.path), one.settings)
     assert one.robot.calls == ["connect", "close"]
     assert one.status["state"] == states.STOPPED
+    assert one.status["finished"] == 1
+
+
+def test_a_run_whose_command_and_watchdog_die_before_it_begins_never_takes_the_robot(bench, monkeypatch):
+    monkeypatch.setattr(company, "_ALONE_S", 0.1)
+    one = bench()
+    control(str(one.exchange.path), one.settings)
+    assert one.robot.calls == ["connect", "close"]
+    assert one.status["stop"] == states.COMMAND_DEAD
     assert one.status["finished"] == 1
 
 

@@ -1,5 +1,6 @@
 """The older Panda's port against a library made up, that calls for each command as libfranka does."""
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,7 +81,10 @@ def test_cycles_follow_each_other_and_commands_arrive(port):
     reading = np.zeros(1, reading_dtype(7))
     port.begin()
     for k in range(5):
+        began = time.perf_counter_ns()
         assert port.read(reading) == 1
+        assert port.arrived_ns <= time.perf_counter_ns()
+        assert k == 0 or port.arrived_ns >= began
         assert reading["time"][0] == pytest.approx(0.001 * k)
         assert (reading["q"][0] == 0.1 * k).all()
         port.write(np.full(7, float(k)))

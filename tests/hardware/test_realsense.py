@@ -78,6 +78,17 @@ def test_a_camera_that_is_gone_is_looked_for_once_a_second(monkeypatch):
     assert len(tries) == 2
 
 
+def test_a_camera_that_is_opened_again_has_no_picture_until_one_comes(device, camera, monkeypatch):
+    """The last picture before it was unplugged is not what it sees now, for a moment at each try."""
+    device.give(picture(1), 1, 33.0)
+    camera.newest(200)
+    monkeypatch.setattr(camera, "_find", lambda: (device.sensor, device.profile))
+    assert camera.look_again()
+    assert camera.newest()[0] is None
+    device.give(picture(2), 2, 66.0)
+    assert (camera.newest(200)[0] == picture(2)).all()
+
+
 def test_closing_twice_does_no_harm(camera):
     camera.close()
     camera.close()

@@ -259,7 +259,7 @@ def test_both_arms_of_one_scene_get_motors():
 REFUSED = {
     "unknown body": ({"site": robots.Flange("palm")},
                      "body 'palm' of the flange is not in the model; give one of: base, shoulder, upper, fore, hand"),
-    "no site": ({"site": None}, "no site is named; give one of: none; or make one by robots.Flange(BODY), on one of: "
+    "no site": ({"site": None}, "site = None; give one of: none; or robots.Flange(BODY) to make one, on one of: "
                                 "base, shoulder, upper, fore, hand"),
     "unknown drive": ({"actuators": "position"},
                       "actuators = 'position'; give 'torque' to replace servos by motors, or None"),

@@ -213,10 +213,9 @@ def test_joints_of_an_arm_without_motors_are_named_and_limited_by_the_caller():
 
 MOTOR_A = '<motor joint="a" ctrlrange="-5 5" gear="3" armature="0.002"/>'
 MOTOR_B = '<motor joint="b" ctrlrange="-5 5"/>'
-OR_FLANGE = "; or make one by robots.Flange(BODY), on one of: upper, lower, plate"
 REFUSED = {
-    "unknown site": ([], {"site": "tcp"}, "site 'tcp' is not in the model; give one of: tip" + OR_FLANGE),
-    "no site": ([], {"site": None}, "no site is named; give one of: tip" + OR_FLANGE),
+    "unknown site": ([], {"site": "tcp"}, "site 'tcp' is not in the model; give one of: tip"),
+    "no site": ([], {"site": None}, "site = None; give one of: tip"),
     "unknown joint": ([], {"joints": ["a", "c"]}, "joint 'c' is not in the model; give one of: a, b"),
     "wrong order": (
         [], {"joints": ["b", "a"]}, "joints = ['b', 'a'] are not in order; from base to tip they stand so: 'a', 'b'",

@@ -71,7 +71,7 @@ def test_what_is_no_urdf_is_told_in_one_line(tmp_path, content, text):
 
 def test_a_call_without_a_link_is_told_those_that_there_are(tmp_path):
     (tmp_path / "arm.urdf").write_text('<robot name="a"><link name="b"/><link name="c"/></robot>', encoding="utf-8")
-    with pytest.raises(InvalidInputError, match=r"^no link is named; give one of b, c$"):
+    with pytest.raises(InvalidInputError, match=r"^link = None; give one of b, c$"):
         robots.from_urdf(tmp_path / "arm.urdf")
 
 

@@ -117,14 +117,14 @@ def test_nothing_is_looked_for_where_the_arm_stands_and_off_the_board(segmenter)
     assert not (found & ~cv2.dilate(expected(where).astype(np.uint8), np.ones((3, 3))).astype(bool)).any()
 
 
-def test_what_the_arm_hides_is_not_seen(segmenter):
+def test_what_the_arm_hides_is_not_beside_it(segmenter):
     hidden = np.zeros((N, N), np.uint8)
-    assert segmenter.seen(hidden).all()
+    assert segmenter.beside(hidden).all()
     hidden[: N // 2] = 255
-    seen = segmenter.seen(hidden)
+    beside = segmenter.beside(hidden)
     size = segmenter.mask_size
-    assert not seen[: size // 2].any()
-    assert seen[size // 2 + 3 :].all()
+    assert not beside[: size // 2].any()
+    assert beside[size // 2 + 4 :].all()
 
 
 def test_with_all_hidden_nothing_is_found(segmenter):

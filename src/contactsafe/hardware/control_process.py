@@ -8,10 +8,21 @@ import traceback
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware import realtime
+from contactsafe.hardware.company import Company
 from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.port import RobotError, RobotSilentError
-from contactsafe.hardware.states import ASKED, CONTROL_DEAD, FAULT, IDLE, ROBOT_FAULT, ROBOT_SILENT, STOPPED, STOPPING
+from contactsafe.hardware.states import (
+    ASKED,
+    COMMAND_DEAD,
+    CONTROL_DEAD,
+    FAULT,
+    IDLE,
+    ROBOT_FAULT,
+    ROBOT_SILENT,
+    STOPPED,
+    STOPPING,
+)
 
 
 def control(exchange_path: str, settings: ControlSettings) -> None:
@@ -52,7 +63,10 @@ def _control(exchange: Exchange, settings: ControlSettings) -> None:
         print(line, flush=True)
     settings.port.connect()
     status["beat_control"] += 1
+    company = Company(status)
     while not status["go"][0]:
+        if company.is_gone():
+            exchange.ask_to_stop(COMMAND_DEAD)
         if status["stop"][0]:
             return
         status["beat_control"] += 1

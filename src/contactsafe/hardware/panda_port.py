@@ -60,7 +60,7 @@ class PandaPort(FrankaPort):
             self._states.put(error)
 
     def _cycle(self, state: Any, passed: Any) -> Any:
-        self._states.put((state, passed))
+        self._states.put((state, passed, time.perf_counter_ns()))
         return self._commands.get()
 
     def read(self, reading: np.ndarray) -> int:
@@ -71,8 +71,7 @@ class PandaPort(FrankaPort):
             raise RobotSilentError((), f"no state for {_SILENT_S:g} s") from None
         if isinstance(found, Exception):
             raise as_ours(self._library, found) from None
-        self.arrived_ns = time.perf_counter_ns()
-        state, passed = found
+        state, passed, self.arrived_ns = found
         self._fill(reading, state)
         return round(1000.0 * passed.to_sec())
 

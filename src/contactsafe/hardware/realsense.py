@@ -145,7 +145,7 @@ class ColourCamera(Unique):
             for end in (self._sensor.stop, self._sensor.close):
                 with contextlib.suppress(RuntimeError):  # it is gone
                     end()
-        self._queue = None
+        self._queue = self._picture = None  # what was seen before is no picture of a camera that is opened again
 
 
 class SoftwareCamera(Unique):

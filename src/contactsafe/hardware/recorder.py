@@ -15,11 +15,11 @@ import numpy as np
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.process import ignore_terminal
+from contactsafe.hardware.company import Company
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.run_log import CDR, RUN, STEPS_TOPIC, TICKS_TOPIC, ros_schema
 
 _EVERY_S = 0.02
-_ALONE_S = 3.0
 
 
 class _File:
@@ -111,13 +111,10 @@ def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     status["pid_recorder"] = os.getpid()
     try:
         recorder = Recorder(exchange, path, run)
-        beats, heard = (-1, -1), time.monotonic()
-        while not status["finished"][0] and time.monotonic() - heard < _ALONE_S:
+        company = Company(status)
+        while not status["finished"][0] and not company.is_gone():
             status["beat_recorder"] += 1
             recorder.drain()
-            now = int(status["beat_watchdog"][0]), int(status["beat_command"][0])
-            if now != beats:
-                beats, heard = now, time.monotonic()
             time.sleep(_EVERY_S)
         recorder.drain()
         recorder.finish()

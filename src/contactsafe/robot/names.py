@@ -11,8 +11,12 @@ SENSOR, BODY = mujoco.mjtObj.mjOBJ_SENSOR, mujoco.mjtObj.mjOBJ_BODY
 _LISTED = 12  # names that a message lists
 
 
-def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str | None) -> int:
+def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str | None, otherwise: str = "") -> int:
     """Return the number of a named thing.
+
+    Args:
+        model, kind, name: as they say; None for a name that was not given.
+        otherwise: a remedy beside the names that there are.
 
     Raises:
         InvalidInputError: there is none of that name, or none was named.
@@ -24,16 +28,15 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str | None) -> int:
             kind
         ]
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-        what = f"no {word} is named" if name is None else f"{word} '{name}' is not in the model"
-        remedy = f"give one of: {listed(filter(None, names))}" + (_or_flange(model) if kind == SITE else "")
-        raise InvalidInputError(f"{what}; {remedy}")
+        what = f"{word} = None" if name is None else f"{word} '{name}' is not in the model"
+        raise InvalidInputError(f"{what}; give one of: {listed(filter(None, names))}{otherwise}")
     return found
 
 
-def _or_flange(model: mujoco.MjModel) -> str:
-    """Return the other remedy where a site is missing, if the bodies have names."""
+def or_flange(model: mujoco.MjModel) -> str:
+    """Return the other remedy where a site is missing and one can be made, if the bodies have names."""
     bodies = [name for i in range(1, model.nbody) if (name := mujoco.mj_id2name(model, BODY, i))]
-    return f"; or make one by robots.Flange(BODY), on one of: {listed(bodies)}" if bodies else ""
+    return f"; or robots.Flange(BODY) to make one, on one of: {listed(bodies)}" if bodies else ""
 
 
 def label(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:

@@ -12,7 +12,7 @@ from contactsafe.robot.binding import actuators_of
 from contactsafe.robot.bodies import link_of
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.missing_meshes import find_meshes
-from contactsafe.robot.names import BODY, JOINT, SITE, find
+from contactsafe.robot.names import BODY, JOINT, SITE, find, or_flange
 from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, name_all, remove
 from contactsafe.robot.user_chain import choose_chain, is_led, refuse_tied
 from contactsafe.robot.user_limits import torque_limits
@@ -92,7 +92,7 @@ def _examine(
     findings.raise_problems()
     name = add_flange(spec, site)
     model = compiled_spec(spec, "the MjSpec")
-    site_id = find(model, SITE, name)
+    site_id = find(model, SITE, name, or_flange(model))
     chain = choose_chain(model, site_id, joints, findings, many=True)
     return model.site(site_id).name, model, chain, torque_limits(model, chain, tau_max, findings)
 

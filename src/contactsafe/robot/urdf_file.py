@@ -48,7 +48,7 @@ def read_urdf(path: str | os.PathLike, link: str | None, findings: Findings) -> 
     root = robot_of(path)
     names = [one.get("name", "") for one in root.findall("link")]
     if link not in names:
-        what = "no link is named" if link is None else f"{os.fspath(path)} has no link {shown(link)}"
+        what = "link = None" if link is None else f"{os.fspath(path)} has no link {shown(link)}"
         raise InvalidInputError(f"{what}; give one of {listed(names)}")
     site = link if link not in {joint.get("name") for joint in root.findall("joint")} else f"{link}_frame"
     _keep_what_collides(root, pathlib.Path(path), findings)

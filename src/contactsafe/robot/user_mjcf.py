@@ -22,7 +22,7 @@ from contactsafe.robot.derived import NOTHING, Found, carried_tool, describe
 from contactsafe.robot.description import Inertia, Joint, Tip
 from contactsafe.robot.findings import Findings
 from contactsafe.robot.missing_meshes import find_meshes
-from contactsafe.robot.names import JOINT, SITE, find
+from contactsafe.robot.names import JOINT, SITE, find, or_flange
 from contactsafe.robot.spec_parts import Flange, add_flange, become_motor, compiled_spec, read_spec
 from contactsafe.robot.surface import geom_surface
 from contactsafe.robot.torque_driven import torque_driven_copy
@@ -95,7 +95,7 @@ def from_mjcf(
     refuse_options(options)
     torque, findings = options.get("actuators") is not None, Findings()
     if isinstance(scene, mujoco.MjModel):
-        model, name = scene, _site_of(site)
+        model, name, otherwise = scene, _site_of(site), ""
     else:
         spec, what = _spec(scene)
         if torque:
@@ -104,14 +104,15 @@ def from_mjcf(
             find_meshes(spec, findings)
             name = add_flange(spec, site)
         model = compiled_spec(spec, what)
-    return arm_in(model, name, joints, options, findings)
+        otherwise = or_flange(model)
+    return arm_in(model, find(model, SITE, name, otherwise), joints, options, findings)
 
 
 def arm_in(
-    model: mujoco.MjModel, site: str | None, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
+    model: mujoco.MjModel, site_id: int, joints: Sequence[str] | None, options: ArmOptions, findings: Findings
 ) -> Arm:
     """Return the arm in a compiled scene, and tell what was found; see `from_mjcf`."""
-    site_id, torque = find(model, SITE, site), options.get("actuators") is not None
+    torque = options.get("actuators") is not None
     chain = choose_chain(model, site_id, joints, findings, many=torque)
     if not torque:
         refuse_weightless(model, chain, findings)

@@ -9,6 +9,7 @@ import numpy as np
 
 from contactsafe.robot.arm import Arm
 from contactsafe.robot.findings import Findings
+from contactsafe.robot.names import SITE, find
 from contactsafe.robot.spec_parts import compiled_spec
 from contactsafe.robot.urdf_file import limit_of, read_urdf, robot_of
 from contactsafe.robot.user_mjcf import ArmOptions, arm_in, refuse_options
@@ -38,7 +39,8 @@ def from_urdf(
     refuse_options(options)
     findings = Findings()
     spec, site = read_urdf(path, link, findings)
-    arm = arm_in(compiled_spec(spec, f"'{os.fspath(path)}'"), site, joints, options, findings)
+    model = compiled_spec(spec, f"'{os.fspath(path)}'")
+    arm = arm_in(model, find(model, SITE, site), joints, options, findings)
     speeds = {joint.get("name"): limit_of(joint, "velocity") for joint in robot_of(path).findall("joint")}
     fastest = [speeds.get(arm.model.joint(i).name, np.inf) for i in range(arm.n)]
     return replace(arm, qd_max=np.array([speed if speed > 0.0 else np.inf for speed in fastest]))

@@ -123,9 +123,12 @@ class Segmenter:
         covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
         return np.where(covered > 255 * self.ink.covered, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
 
-    def seen(self, hidden: np.ndarray) -> np.ndarray:
-        """Return which of the mask's pixels are beside the arm, bool (mask_size, mask_size); see `segment`."""
-        around_arm = cv2.dilate((hidden != 0).astype(np.uint8) * 255, self._rim)
+    def beside(self, hidden: np.ndarray) -> np.ndarray:
+        """Return which of the mask's pixels are beside the arm, bool (mask_size, mask_size); see `segment`.
+
+        Thin lines are looked for two rims away from it, so all that is nearer counts as hidden.
+        """
+        around_arm = cv2.dilate((hidden != 0).astype(np.uint8) * 255, self._rim, iterations=2)
         covered = cv2.resize(around_arm, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
         return covered <= 255 * self.ink.covered
 

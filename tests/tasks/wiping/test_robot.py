@@ -68,11 +68,16 @@ def test_ink_goes_under_a_pressed_pad_alone_and_somebody_draws_once_the_arm_is_a
 def test_a_board_that_the_robot_takes_for_clean_is_drawn_on_as_well(shown, arm):
     """Six per cent of its ink were left, in too few pixels to be seen from above, and both waited for six minutes."""
     board, known = board_of(shown, arm), map_shown(shown, BoardConfig())[0]
+    high = np.array([0.5, 0.0, 0.1])
+    for tick in range(20_000):  # a slow arm is on its way
+        board.after_step(tick, np.zeros(7), high, np.eye(3), 0.0)
+    assert known["number"] == 0
+    board.after_step(1, np.zeros(7), np.array([0.3, -0.25, 0.012]), np.eye(3), 5.0)
     for number, away in ((0, 9_900), (1, 200)):
         for tick in range(away):
-            board.after_step(tick, np.zeros(7), np.array([0.5, 0.0, 0.1]), np.eye(3), 0.0)
+            board.after_step(tick, np.zeros(7), high, np.eye(3), 0.0)
         assert known["number"] == number
-    assert known["ink"][0] == known["ink_start"][0]
+    assert known["ink"][0] > 0.05 * known["ink_start"][0]
 
 
 def test_the_first_board_is_drawn_when_it_is_to_be(shown, arm):
@@ -176,19 +181,21 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
             work.pictures.number += 1
             work.look(seen, np.zeros(6), steps)
 
-    look(150, -1, 700)
+    look(150, -1, 400)
     look(150, 0, 1)
     assert not work.is_stalled()
-    look(150, 1, 400)
-    look(100, 401, 400)  # some of it is gone
+    look(150, 1, 200)
+    look(100, 201, 200)  # some of it is gone
     assert not work.is_stalled()
-    look(120, 801, 400)
+    look(120, 401, 200)
     assert work.is_stalled()
     look(0, -1, 200)  # from the start the arm hides it
     assert not work.is_stalled()
     assert work.is_ready()
     look(0, 0, 1)
-    look(0, 1, 30)
+    look(0, 1, 10)
+    assert not work.is_done()
+    look(0, 11, 20)
     assert work.is_done()
     look(0, -1, 200)
     assert not work.is_ready()
@@ -221,6 +228,34 @@ def test_ink_that_the_arm_hides_is_ink_until_it_is_seen_to_be_gone(arm):
     look(inked, False, 70, 5)
     look(inked, True, 75, 100)
     assert work.is_done()  # it does not wait for ever
+
+
+def test_work_that_was_given_up_remembers_what_the_arm_hides(arm):
+    white = np.full((455, 455, 3), 220, np.uint8)
+    inked, pictures = white.copy(), Shown(white)
+    inked[200:206, 200:260] = 20
+    work = WipingWork(pictures)
+    work.prepare(arm, False)
+    seen, hides = np.zeros(1, seen_dtype(7))[0], np.zeros((455, 455), np.uint8)
+    seen["q"] = arm.home
+    work._eye.hidden = lambda solids: hides
+
+    def look(photo, hidden, steps, times):
+        hides[:] = 0
+        hides[180:225, 180:280] = 255 * hidden
+        for _ in range(times):
+            pictures.photo, pictures.number = photo, pictures.number + 1
+            work.look(seen, np.zeros(6), steps)
+
+    look(inked, False, -1, 10)
+    look(inked, False, 0, 1)
+    look(inked, False, 1, 310)
+    assert work.is_stalled()
+    look(inked, True, -1, 100)  # from the start the arm hides it
+    assert work.is_ready()
+    look(inked, True, 0, 1)
+    look(inked, True, 1, 60)
+    assert not work.is_done()
 
 
 def test_force_is_what_is_more_than_in_the_air(arm):

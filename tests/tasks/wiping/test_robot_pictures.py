@@ -144,3 +144,25 @@ def test_by_the_clock_a_process_of_its_own_draws_and_ends_with_the_camera(tmp_pa
     finally:
         made.close()
     assert not made._process.is_alive()
+
+
+def test_while_a_picture_is_drawn_the_last_one_stays_the_newest(tmp_path):
+    """Numbers skip where drawing is slow, and what was drawn over was the newest: pictures went back in time."""
+    create_shown(tmp_path / "board", BoardConfig())
+    shown = map_shown(tmp_path / "board", BoardConfig())[0]
+    shown["q"] = robots.fr3().home
+    made = PhotographedBoard(tmp_path / "board", robots.fr3(), BoardConfig(), Camera(), 3)
+    made.open(lockstep=False)
+    try:
+        numbers, ages, tick, until = [], [], 0, time.monotonic() + 60.0
+        while tick < 33 * 40 and time.monotonic() < until:
+            tick += 3  # far faster than pictures are drawn
+            shown["tick"] = tick
+            numbers.append(made.latest(0)[1])
+            ages.append(made.latest(0)[2])
+            time.sleep(0.001)
+        assert (np.diff(numbers) >= 0).all()
+        assert len(set(numbers)) > 5
+        assert min(ages) >= 0.0
+    finally:
+        made.close()

@@ -81,7 +81,7 @@ class WipedBoard:
         self._shown = map_shown(self._path, self._config)
         self._board = Whiteboard(self._config)
         self._board.cells = self._shown["cells"][0]
-        self._away, self._drawings = 0, self._all_drawings()
+        self._away, self._visited, self._drawings = 0, False, self._all_drawings()
         self._shown["number"] = -1
 
     def _all_drawings(self) -> list[np.ndarray]:
@@ -95,7 +95,7 @@ class WipedBoard:
 
     def _draw(self, number: int) -> None:
         shown = self._shown[0]
-        self._board.cells[:] = self._drawings[number]
+        self._board.cells[:], self._visited = self._drawings[number], False
         shown["number"] = number
         shown["ink_start"][number] = shown["ink"][number] = self._board.ink_cells
 
@@ -111,7 +111,9 @@ class WipedBoard:
             erased = self._wipe(self._board.cells, position, rotation)
             if erased and shown["number"] >= 0:
                 shown["ink"][shown["number"]] = np.count_nonzero(self._board.cells == INK)
-        self._away = self._away + 1 if position[2] > config.centre[2] + _AWAY_M else 0
+        is_away = position[2] > config.centre[2] + _AWAY_M
+        self._away = self._away + 1 if is_away else 0
+        self._visited = self._visited or not is_away
         if self._is_drawn_on(tick, int(shown["number"])):
             self._away = 0
             self._draw(int(shown["number"]) + 1)
@@ -122,4 +124,5 @@ class WipedBoard:
             return tick >= self._first_tick
         shown = self._shown[0]
         clean = shown["ink"][number] <= 0.05 * shown["ink_start"][number]
-        return bool(self._away > (_AWAY_TICKS if clean else _LEFT_TICKS) and number + 1 < self._rounds)
+        left = self._away > _AWAY_TICKS if clean else self._visited and self._away > _LEFT_TICKS
+        return bool(left and number + 1 < self._rounds)

@@ -112,14 +112,14 @@ def draw_pictures(subject: Subject) -> None:
     ignore_terminal()
     keep_to_one_thread()
     os.nice(_GIVES_WAY)
-    parent, drawing, number = os.getppid(), Drawing(subject), -1
+    parent, drawing, number, slot = os.getppid(), Drawing(subject), -1, 0
     shown = drawing.shown[0]
     while os.getppid() == parent:
         now = int(shown["tick"]) // _EVERY_TICKS
         if now == number:
             time.sleep(_NAP_S)
             continue
-        number, slot = now, now % 2
+        number, slot = now, 1 - slot
         shown["taken"][slot], shown["taken_tick"][slot] = 0, shown["tick"]
         shown["pictures"][slot] = drawing.picture(number)
         shown["taken"][slot] = number + 1
@@ -172,15 +172,15 @@ class PhotographedBoard:
 
         By the clock its age is counted in the simulator's ticks: control has fewer, by the states that it lost.
         """
-        number = tick // _EVERY_TICKS if self._drawing else int(self._shown["taken"].max()) - 1
-        if number not in (self._number, -1):
-            self._take(number, tick)
         now = tick if self._drawing else int(self._shown["tick"][0])
+        number = tick // _EVERY_TICKS if self._drawing else int(self._shown["taken"].max()) - 1
+        if number > self._number:
+            self._take(number, tick)
         return self._photo, self._number, float(now - self._tick)
 
     def _take(self, number: int, tick: int) -> None:
         """Hand a picture to the device, and take it from there as that of a real one."""
-        slot = number % 2
+        slot = int(self._shown["taken"][0].argmax())
         taken = tick if self._drawing else int(self._shown["taken_tick"][0, slot])
         picture = self._drawing.picture(number) if self._drawing else self._shown["pictures"][0, slot].copy()
         if not self._drawing and self._shown["taken"][0, slot] != number + 1:

@@ -36,8 +36,8 @@ _AIR_LOOKS, _LEAST_AIR_LOOKS = 60, 20
 """Looks in the air, at rest, whose median is what the tool is taken to be pressed with there; and without which no work
 begins."""
 
-_STALLED_LOOKS = 600
-"""Looks, ten seconds, without less ink than before after which the board is looked at anew from the start."""
+_STALLED_LOOKS = 300
+"""New pictures, ten seconds, without less ink than before after which the work is begun anew from the start."""
 
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
@@ -110,7 +110,7 @@ class WipingWork:
         self._segmenter = Segmenter(self._eye.homography, corners, PHOTO_PX, self.camera.size)
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
-        self._inked_when_seen = np.zeros(self._mask.shape, bool)
+        self._left = np.zeros(self._mask.shape, bool)
         self._number, self._age_ms = -1, float("nan")
         self._spotless, self._clean, self._inked = 0, 0, 0
         self._least_px, self._no_less, self._unfinished = math.inf, 0, False
@@ -132,29 +132,30 @@ class WipingWork:
             solids = self._eye.solids_at(self._posture_at(float(seen["tick"]) - self._age_ms))
             hidden = self._eye.hidden(solids) if self._view is None else self._view.hidden(solids)
             self._mask = self._segmenter.segment(picture, hidden)
-            self._count(self._segmenter.seen(hidden), steps)
-        self._follow_progress(steps)
+            self._remember(self._segmenter.beside(hidden), steps)
+            self._count(steps)
+        if steps == 0:
+            self._spotless, self._clean, self._unfinished = 0, 0, False
         observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
         return observed
 
-    def _count(self, seen: np.ndarray, steps: int) -> None:
-        """Count pictures with ink and without; what the arm hides is as it was when last seen in this work."""
-        inked = self._mask == 0
-        self._inked_when_seen = inked | (self._inked_when_seen & ~seen & (steps >= 0))
-        shows = int(np.count_nonzero(inked)) >= _LEAST_PX
-        self._spotless = 0 if self._inked_when_seen.any() else self._spotless + 1
+    def _remember(self, beside: np.ndarray, steps: int) -> None:
+        """Take ink that the arm hides for what it was when last seen in this work, or in what was given up before."""
+        hidden = ~beside if steps >= 0 or self._unfinished else np.zeros_like(beside)
+        self._left = (self._mask == 0) | (self._left & hidden)
+
+    def _count(self, steps: int) -> None:
+        """Count new pictures with ink and without, and those since the least ink of this work was left."""
+        shows, left = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX, int(np.count_nonzero(self._left))
+        self._spotless = 0 if left > 0 else self._spotless + 1
         self._clean = 0 if shows else self._clean + 1
         self._inked = self._inked + 1 if shows else 0
-
-    def _follow_progress(self, steps: int) -> None:
-        """Count the looks since the least ink of this work was seen."""
-        shown = int(np.count_nonzero(self._mask == 0))
-        less = shown < self._least_px
-        self._least_px = shown if less or steps <= 0 else self._least_px
-        self._no_less = 0 if less or steps <= 0 else self._no_less + 1
-        self._unfinished = self.is_stalled() if steps > 0 else self._unfinished
+        less = left < self._least_px or steps <= 0
+        self._least_px = left if less else self._least_px
+        self._no_less = 0 if less else self._no_less + 1
+        self._unfinished = self._unfinished or self.is_stalled()
 
     def _tare(self, seen: np.void, steps: int) -> None:
         """Remember the force in the air, as a force sensor is zeroed; a push of less than half a second is none."""
@@ -178,7 +179,7 @@ class WipingWork:
         return self._age_ms > _BLIND_MS
 
     def is_ready(self) -> bool:
-        """Tell whether ink is seen, or was left behind the arm, and the force in the air is known."""
+        """Tell whether ink is seen, or work was given up before, and the force in the air is known."""
         return (self._inked >= _INKED_LOOKS or self._unfinished) and len(self._air) >= _LEAST_AIR_LOOKS
 
     def is_done(self) -> bool:
