@@ -33,7 +33,7 @@ class Work(InsertionWork):
     def is_blind(self):
         return self.blind
 
-    def is_stalled(self):
+    def is_stalled(self, speed):
         return self.stalled
 
 

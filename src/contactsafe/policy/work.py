@@ -56,8 +56,12 @@ class Work(Protocol):
         """Tell whether the work that was begun is done."""
         ...
 
-    def is_stalled(self) -> bool:
-        """Tell whether the work that was begun gets nowhere, and is better begun anew from the start."""
+    def is_stalled(self, speed: float) -> bool:
+        """Tell whether the work that was begun gets nowhere, and is better begun anew from the start.
+
+        Args:
+            speed: factor on how fast the target moves, at most 1.
+        """
         ...
 
     def seen_with(self) -> tuple[float, int]:

@@ -69,11 +69,12 @@ def test_a_peg_that_searched_for_long_is_lifted_and_tried_anew(arm):
     work.prepare(arm, False)
     seen = seen_at(arm, np.zeros(6))
     work.look(seen, np.zeros(6), 1000)
-    assert not work.is_stalled()
+    assert not work.is_stalled(1.0)
     work.look(seen, np.zeros(6), 1300)
-    assert work.is_stalled()
+    assert work.is_stalled(1.0)
+    assert not work.is_stalled(0.2)
     work.look(seen, np.zeros(6), -1)
-    assert not work.is_stalled()
+    assert not work.is_stalled(1.0)
 
 
 def test_the_block_moves_once_a_peg_was_in_and_is_out_again():

@@ -104,9 +104,9 @@ class InsertionWork:
         """Tell whether the peg is in."""
         return self._depth >= self._config.depth_m
 
-    def is_stalled(self) -> bool:
+    def is_stalled(self, speed: float) -> bool:
         """Tell whether the peg has been searching for long."""
-        return self._steps > _STALLED_STEPS
+        return self._steps > _STALLED_STEPS / speed
 
     def seen_with(self) -> tuple[float, int]:
         """Return that nothing was seen."""

@@ -37,7 +37,7 @@ _AIR_LOOKS, _LEAST_AIR_LOOKS = 60, 20
 begins."""
 
 _STALLED_LOOKS = 300
-"""New pictures, ten seconds, without less ink than before after which the work is begun anew from the start."""
+"""New pictures, ten seconds at full speed, without less ink than before after which the work is begun anew."""
 
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
@@ -111,7 +111,7 @@ class WipingWork:
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._left = np.zeros(self._mask.shape, bool)
-        self._number, self._age_ms = -1, float("nan")
+        self._number, self._age_ms, self._steps = -1, float("nan"), -1
         self._spotless, self._clean, self._inked = 0, 0, 0
         self._least_px, self._no_less, self._unfinished = math.inf, 0, False
         self._air: deque[np.ndarray] = deque(maxlen=_AIR_LOOKS)
@@ -124,6 +124,8 @@ class WipingWork:
         Force is what is more than in the air, where the tool waited. Where the board was calibrated to lie elsewhere,
         the pose is given in the policy's frame, too.
         """
+        if steps < 0 <= self._steps:
+            self._unfinished = not self.is_done()
         self._tare(seen, steps)
         picture, number, self._age_ms = self.pictures.latest(int(seen["tick"]))
         self._past.append((float(seen["tick"]), seen["q"].copy()))
@@ -136,6 +138,7 @@ class WipingWork:
             self._count(steps)
         if steps == 0:
             self._spotless, self._clean, self._unfinished = 0, 0, False
+        self._steps = steps
         observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
         if self.placed is not None:
             observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
@@ -155,7 +158,6 @@ class WipingWork:
         less = left < self._least_px or steps <= 0
         self._least_px = left if less else self._least_px
         self._no_less = 0 if less else self._no_less + 1
-        self._unfinished = self._unfinished or self.is_stalled()
 
     def _tare(self, seen: np.void, steps: int) -> None:
         """Remember the force in the air, as a force sensor is zeroed; a push of less than half a second is none."""
@@ -186,9 +188,9 @@ class WipingWork:
         """Tell whether no ink has been left for a while, or none been seen but specks for longer."""
         return self._spotless >= _CLEAN_LOOKS or self._clean >= _SPECK_LOOKS
 
-    def is_stalled(self) -> bool:
+    def is_stalled(self, speed: float) -> bool:
         """Tell whether there has been no less ink for long: a policy that remembers nothing may go round in circles."""
-        return self._no_less > _STALLED_LOOKS
+        return self._no_less > _STALLED_LOOKS / speed
 
     def seen_with(self) -> tuple[float, int]:
         """Return the picture's age and how much ink its mask shows."""
