@@ -1,5 +1,6 @@
 """What stops a Franka by itself, from a simulator that enforces it, in an environment of its own."""
 
+import contextlib
 import os
 import socket
 import subprocess
@@ -99,6 +100,8 @@ def simulator(python, model, tmp_path_factory):
         environment = {**os.environ, "FR3_MJCF": str(model), "PYTHONPATH": ""}
         words = [python, "-c", SERVER, address]
         process = subprocess.Popen(words, env=environment, stdout=file, stderr=file)
+    with contextlib.suppress(PermissionError):  # a robot's own computer waits for no program of this one
+        os.setpriority(os.PRIO_PROCESS, process.pid, -10)
     until = time.monotonic() + 60.0
     while not answers(address):
         assert process.poll() is None, said.read_text()
@@ -144,7 +147,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_what_stops_the_robot_ends_the_run_by_name_and_a_person_can_recover_it(simulator, fault, capfd):
-    for _ in range(8):  # on a busy machine the simulator is late as well, and a short stall is no loss
+    for _ in range(3):  # on a busy machine the simulator is late as well, and a short stall is no loss
         ending = held(simulator, fault)
         if not ending.went_well:
             break

@@ -202,60 +202,50 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
     assert not work.is_ready()
 
 
-def test_ink_that_the_arm_hides_is_ink_until_it_is_seen_to_be_gone(arm):
-    """From the start the arm hides a part of the board; six per cent of the ink were left behind it."""
-    white = np.full((455, 455, 3), 220, np.uint8)
+def hiding(arm):
+    """Return work, and what lets it look at a line of ink or none, behind the arm or not, for so many pictures."""
+    white, hides = np.full((455, 455, 3), 220, np.uint8), np.zeros((455, 455), np.uint8)
     inked, pictures = white.copy(), Shown(white)
     inked[200:206, 200:260] = 20
     work = WipingWork(pictures)
     work.prepare(arm, False)
-    seen, hides = np.zeros(1, seen_dtype(7))[0], np.zeros((455, 455), np.uint8)
-    seen["q"] = arm.home
     work._eye.hidden = lambda solids: hides
+    seen = np.zeros(1, seen_dtype(7))[0]
+    seen["q"] = arm.home
 
-    def look(photo, hidden, steps, times):
-        hides[:] = 0
-        hides[190:215, 190:270] = 255 * hidden
+    def look(is_inked, hidden, steps, times):
+        hides[180:225, 180:280] = 255 * hidden
         for _ in range(times):
-            pictures.photo, pictures.number = photo, pictures.number + 1
+            pictures.photo, pictures.number = inked if is_inked else white, pictures.number + 1
             work.look(seen, np.zeros(6), steps)
 
-    look(inked, False, -1, 10)
-    look(inked, False, 0, 5)
-    look(inked, True, 5, 40)
+    return work, look
+
+
+def test_ink_that_the_arm_hides_is_ink_until_it_is_seen_to_be_gone(arm):
+    """From the start the arm hides a part of the board; six per cent of the ink were left behind it."""
+    work, look = hiding(arm)
+    look(True, False, -1, 10)
+    look(True, False, 0, 5)
+    look(True, True, 5, 40)
     assert not work.is_done()
-    look(white, False, 45, 25)
+    look(False, False, 45, 25)
     assert work.is_done()
-    look(inked, False, 70, 5)
-    look(inked, True, 75, 100)
+    look(True, False, 70, 5)
+    look(True, True, 75, 100)
     assert work.is_done()  # it does not wait for ever
 
 
 def test_work_that_was_given_up_remembers_what_the_arm_hides(arm):
-    white = np.full((455, 455, 3), 220, np.uint8)
-    inked, pictures = white.copy(), Shown(white)
-    inked[200:206, 200:260] = 20
-    work = WipingWork(pictures)
-    work.prepare(arm, False)
-    seen, hides = np.zeros(1, seen_dtype(7))[0], np.zeros((455, 455), np.uint8)
-    seen["q"] = arm.home
-    work._eye.hidden = lambda solids: hides
-
-    def look(photo, hidden, steps, times):
-        hides[:] = 0
-        hides[180:225, 180:280] = 255 * hidden
-        for _ in range(times):
-            pictures.photo, pictures.number = photo, pictures.number + 1
-            work.look(seen, np.zeros(6), steps)
-
-    look(inked, False, -1, 10)
-    look(inked, False, 0, 1)
-    look(inked, False, 1, 310)
+    work, look = hiding(arm)
+    look(True, False, -1, 10)
+    look(True, False, 0, 1)
+    look(True, False, 1, 310)
     assert work.is_stalled(1.0)
-    look(inked, True, -1, 100)  # from the start the arm hides it
+    look(True, True, -1, 100)  # from the start the arm hides it
     assert work.is_ready()
-    look(inked, True, 0, 1)
-    look(inked, True, 1, 60)
+    look(True, True, 0, 1)
+    look(True, True, 1, 60)
     assert not work.is_done()
 
 
