@@ -22,7 +22,7 @@ SCENARIO = "simulated Franka"
 
 METRICS = (
     Metric("pushed_mm", "tool moved by 25 N on link 5, at rest", "mm", main=True, aim=Aim(ratio_at_most=1 / 3)),
-    Metric("met_peak_n", "force of the bottle on the arm, peak", "N", main=True),
+    Metric("met_peak_n", "force of the bottle on the arm, peak until it is taken away", "N", main=True),
     Metric("met_steady_n", "the same, steady", "N", main=True, aim=Aim(ratio_at_most=1 / 3)),
     Metric("tip_peak_n", "force on the tool, peak", "N", main=True),
     Metric("tip_contact_n", "the same, median in contact", "N"),
