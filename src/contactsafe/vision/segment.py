@@ -34,7 +34,8 @@ class InkThresholds:
         line: a pixel this fraction darker than both sides of a line may be ink, where the line is long.
         clear_line: a line has a pixel this much darker.
         line_px: of the photograph's pixels, how long a line is at least; half as many are as wide as one is at most.
-        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked.
+        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked;
+            within twice as far nothing but the end of a stroke is ink.
     """
 
     faint: float = 0.15
@@ -118,15 +119,17 @@ class Segmenter:
             darkest = _darkest(photo[self._window], seen)
             background = _background(darkest, seen)
             evened = cv2.divide(darkest, background, scale=_BRIGHT)
-            specks = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen)
-            ink[self._window] = cv2.bitwise_or(specks, self._lines(darkest, background, seen))
+            # Within two rims of the arm and of the picture's end all may be dark by what is beyond.
+            well_inside = cv2.erode(seen, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+            specks = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen, well_inside)
+            ink[self._window] = cv2.bitwise_or(specks, self._lines(darkest, background, well_inside))
         covered = cv2.resize(ink, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
         return np.where(covered > 255 * self.ink.covered, INK_PIXEL, OTHER_PIXEL).astype(np.uint8)
 
     def beside(self, hidden: np.ndarray) -> np.ndarray:
         """Return which of the mask's pixels are beside the arm, bool (mask_size, mask_size); see `segment`.
 
-        Thin lines are looked for two rims away from it, so all that is nearer counts as hidden.
+        Nearer than two rims it is the end of a stroke at most that is seen, so all of that counts as hidden.
         """
         around_arm = cv2.dilate((hidden != 0).astype(np.uint8) * 255, self._rim, iterations=2)
         covered = cv2.resize(around_arm, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
@@ -140,8 +143,8 @@ class Segmenter:
         around_arm = cv2.dilate(hidden[self._window], self._rim)
         return cv2.bitwise_and(self._board[self._window], cv2.bitwise_not(around_arm))
 
-    def _ink(self, evened: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """255 where ink is: specks that hold a clear and sharp pixel, with the faint ones around it, uint8."""
+    def _ink(self, evened: np.ndarray, seen: np.ndarray, well_inside: np.ndarray) -> np.ndarray:
+        """255 where ink is: specks with a clear and sharp pixel well inside, with the faint ones around it, uint8."""
         middle, noise = _middle_and_spread(evened, seen)
         faint = middle - max(_BRIGHT * self.ink.faint, 4 * noise)
         clear = middle - max(_BRIGHT * self.ink.clear, 6 * noise)
@@ -152,7 +155,8 @@ class Segmenter:
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]
         kept = np.zeros(count, np.uint8)
-        kept[names[(evened.ravel()[places] < clear) & sharp.ravel()[places]]] = 255
+        sure = (evened.ravel()[places] < clear) & sharp.ravel()[places] & (well_inside.ravel()[places] > 0)
+        kept[names[sure]] = 255
         kept[stats[:, cv2.CC_STAT_AREA] < self.ink.least_px] = 0
         ink = np.zeros_like(evened)
         ink.ravel()[places] = kept[names]
@@ -160,11 +164,8 @@ class Segmenter:
 
     def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
-        # Beside the arm, and where the picture ends, its pixels are dark by what is beyond: that is no line.
-        seen = cv2.erode(seen, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
         smooth = cv2.min(darkest, background)  # nor is what lies between two reflections
-        np.copyto(smooth, background, where=seen == 0)
-        smooth = cv2.bitwise_and(cv2.GaussianBlur(smooth, (5, 5), _LINE_BLUR_PX), seen)
+        smooth = cv2.GaussianBlur(cv2.bitwise_and(smooth, seen), (5, 5), _LINE_BLUR_PX)
         sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
         hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
         usual, noise = _middle_and_spread(hollow, seen)

@@ -184,10 +184,10 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
     look(150, -1, 400)
     look(150, 0, 1)
     assert not work.is_stalled(1.0)
-    look(150, 1, 200)
-    look(100, 201, 200)  # some of it is gone
+    look(150, 1, 100)
+    look(100, 101, 100)  # some of it is gone
     assert not work.is_stalled(1.0)
-    look(120, 401, 200)
+    look(120, 201, 100)
     assert work.is_stalled(1.0)
     assert not work.is_stalled(0.2)  # a slow arm takes longer
     look(0, -1, 200)  # from the start the arm hides it
@@ -240,7 +240,7 @@ def test_work_that_was_given_up_remembers_what_the_arm_hides(arm):
     work, look = hiding(arm)
     look(True, False, -1, 10)
     look(True, False, 0, 1)
-    look(True, False, 1, 310)
+    look(True, False, 1, 160)
     assert work.is_stalled(1.0)
     look(True, True, -1, 100)  # from the start the arm hides it
     assert work.is_ready()

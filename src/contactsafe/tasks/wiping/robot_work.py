@@ -36,8 +36,8 @@ _AIR_LOOKS, _LEAST_AIR_LOOKS = 60, 20
 """Looks in the air, at rest, whose median is what the tool is taken to be pressed with there; and without which no work
 begins."""
 
-_STALLED_LOOKS = 300
-"""New pictures, ten seconds at full speed, without less ink than before after which the work is begun anew."""
+_STALLED_LOOKS = 150
+"""New pictures, five seconds at full speed, without less ink than before after which the work is begun anew."""
 
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
