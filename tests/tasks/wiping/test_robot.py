@@ -16,6 +16,7 @@ pytest.importorskip("pyrealsense2", exc_type=ImportError)  # or without libusb
 
 from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
 from contactsafe.tasks.wiping.robot_work import WipingWork
+from contactsafe.vision.silhouette import on_plane
 
 
 @pytest.fixture(scope="module")
@@ -200,6 +201,29 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
     assert work.is_done()
     look(0, -1, 200)
     assert not work.is_ready()
+
+
+def test_a_policy_that_stood_still_between_two_strokes_is_shown_the_nearest_alone(arm):
+    white = np.full((455, 455, 3), 220, np.uint8)
+    white[200:206, 150:200] = white[300:306, 260:310] = 20
+    work = WipingWork(Shown(white))
+    work.prepare(arm, False)
+    seen = np.zeros(1, seen_dtype(7))[0]
+    seen["q"] = [1.5, *arm.home[1:]]  # aside
+    scale = 128 / 455
+
+    def shown(column, row):
+        """Which rows of the mask show ink once nothing has become less for a while under a tool at this pixel."""
+        there = on_plane(np.array([[column, row]]) * scale, np.linalg.inv(work.homography))[0]
+        masks = []
+        for step in range(70):
+            work.pictures.number += 1
+            masks.append(work.look(seen, np.array([*there, 0.0, 0.0, 0.0, 0.0]), step)["mask"][..., 0] == 0)
+        assert masks[40][: round(250 * scale)].any() and masks[40][round(250 * scale) :].any()
+        return np.flatnonzero(masks[-1].any(axis=1)) / scale
+
+    assert len(shown(175, 230)) and (shown(175, 230) < 250).all()
+    assert len(shown(285, 270)) and (shown(285, 270) > 250).all()
 
 
 def hiding(arm):

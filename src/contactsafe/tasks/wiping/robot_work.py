@@ -16,8 +16,9 @@ from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
 from contactsafe.tasks.wiping.placed_camera import PlacedCamera
-from contactsafe.vision.opencv import keep_to_one_thread
+from contactsafe.vision.opencv import cv2, keep_to_one_thread
 from contactsafe.vision.segment import Segmenter
+from contactsafe.vision.silhouette import on_plane
 
 _START_M = 0.06
 """Above the board's middle."""
@@ -38,6 +39,13 @@ begins."""
 
 _STALLED_LOOKS = 150
 """New pictures, five seconds at full speed, without less ink than before after which the work is begun anew."""
+
+_TORN_LOOKS = 60
+"""New pictures, two seconds, without less ink after which the policy is shown the nearest ink alone: it may stand still
+between two goals that attract it equally."""
+
+_TOGETHER_PX = 5
+"""Ink that is nearer to other ink than half of this is one goal with it."""
 
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
@@ -139,10 +147,16 @@ class WipingWork:
         if steps == 0:
             self._spotless, self._clean, self._unfinished = 0, 0, False
         self._steps = steps
-        observed = {"mask": self._mask[..., None], "force": seen["force"] - self._tare_n}
+        observed = {"force": seen["force"] - self._tare_n}
         if self.placed is not None:
-            observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
+            pose = observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
+        torn = self._no_less > _TORN_LOOKS
+        observed["mask"] = (_nearest_ink(self._mask, self._pixel_of(pose)) if torn else self._mask)[..., None]
         return observed
+
+    def _pixel_of(self, pose: np.ndarray) -> np.ndarray:
+        """Return where the mask shows the board under the tool, u and v."""
+        return on_plane(pose[None, :2], self.homography)[0]
 
     def _remember(self, beside: np.ndarray, steps: int) -> None:
         """Take ink that the arm hides for what it was when last seen in this work, or in what was given up before."""
@@ -199,3 +213,14 @@ class WipingWork:
     def close(self) -> None:
         """Let go of the camera."""
         self.pictures.close()
+
+
+def _nearest_ink(mask: np.ndarray, pixel: np.ndarray) -> np.ndarray:
+    """Return a mask without all ink but the piece that is nearest to a pixel."""
+    ink = (mask == 0).astype(np.uint8)
+    places = np.argwhere(ink)
+    if len(places) == 0:
+        return mask
+    _, pieces = cv2.connectedComponents(cv2.dilate(ink, np.ones((_TOGETHER_PX,) * 2, np.uint8)))
+    nearest = places[np.linalg.norm(places - pixel[::-1], axis=1).argmin()]
+    return np.where((ink > 0) & (pieces == pieces[tuple(nearest)]), 0, 255).astype(np.uint8)
