@@ -33,7 +33,7 @@ class Work(InsertionWork):
     def is_blind(self):
         return self.blind
 
-    def is_stalled(self, speed):
+    def is_stalled(self):
         return self.stalled
 
 

@@ -104,7 +104,7 @@ class Actor(Unique):
         if self.steps >= 0 and self.work.is_done():
             self.steps, self.waited, self.rounds = -1, 0, self.rounds + 1
             self.done = self.settings.rounds > 0 and self.rounds >= self.settings.rounds
-        elif self.steps >= 0 and self.work.is_stalled(self.settings.speed):
+        elif self.steps >= 0 and self.work.is_stalled():
             self.steps, self.waited = -1, 0
         if self.steps < 0 and self._travel() and self.work.is_ready():
             self.steps = 0

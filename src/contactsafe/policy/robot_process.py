@@ -28,7 +28,7 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
     status["pid_policy"] = os.getpid()
     work = settings.work
     try:
-        work.prepare(settings.arm, settings.lockstep)
+        work.prepare(settings.arm, settings.lockstep, settings.speed)
         actor = Actor(settings, exchange)
         status["ready_policy"] = 0
         status["beat_policy"] += 1

@@ -36,8 +36,14 @@ class Work(Protocol):
         """Of the camera that makes the masks; None where there is none."""
         ...
 
-    def prepare(self, arm: Arm, lockstep: bool) -> None:
-        """Open what it looks with; in the policy's process."""
+    def prepare(self, arm: Arm, lockstep: bool, speed: float = 1.0) -> None:
+        """Open what it looks with; in the policy's process.
+
+        Args:
+            arm: that works.
+            lockstep: pictures are taken as control counts ticks.
+            speed: factor on how fast the target moves, at most 1: all takes longer by it.
+        """
         ...
 
     def look(self, seen: np.void, pose: np.ndarray, steps: int) -> dict[str, np.ndarray]:
@@ -56,12 +62,8 @@ class Work(Protocol):
         """Tell whether the work that was begun is done."""
         ...
 
-    def is_stalled(self, speed: float) -> bool:
-        """Tell whether the work that was begun gets nowhere, and is better begun anew from the start.
-
-        Args:
-            speed: factor on how fast the target moves, at most 1.
-        """
+    def is_stalled(self) -> bool:
+        """Tell whether the work that was begun gets nowhere, and is better begun anew from the start."""
         ...
 
     def seen_with(self) -> tuple[float, int]:

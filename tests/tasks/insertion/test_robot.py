@@ -65,16 +65,20 @@ def test_a_peg_at_depth_is_done_and_the_next_one_waits(arm):
 
 
 def test_a_peg_that_searched_for_long_is_lifted_and_tried_anew(arm):
-    work = InsertionWork(InsertionConfig())
+    work, slow = InsertionWork(InsertionConfig()), InsertionWork(InsertionConfig())
     work.prepare(arm, False)
+    slow.prepare(arm, False, 0.2)
     seen = seen_at(arm, np.zeros(6))
-    work.look(seen, np.zeros(6), 1000)
-    assert not work.is_stalled(1.0)
-    work.look(seen, np.zeros(6), 1300)
-    assert work.is_stalled(1.0)
-    assert not work.is_stalled(0.2)
-    work.look(seen, np.zeros(6), -1)
-    assert not work.is_stalled(1.0)
+
+    def are_stalled(steps):
+        for one in (work, slow):
+            one.look(seen, np.zeros(6), steps)
+        return work.is_stalled(), slow.is_stalled()
+
+    assert are_stalled(1000) == (False, False)
+    assert are_stalled(1300) == (True, False)
+    assert are_stalled(6100) == (True, True)
+    assert are_stalled(-1) == (False, False)
 
 
 def test_the_block_moves_once_a_peg_was_in_and_is_out_again():

@@ -16,7 +16,6 @@ pytest.importorskip("pyrealsense2", exc_type=ImportError)  # or without libusb
 
 from contactsafe.tasks.wiping.robot_photographs import PhotographedBoard
 from contactsafe.tasks.wiping.robot_work import WipingWork
-from contactsafe.vision.silhouette import on_plane
 
 
 @pytest.fixture(scope="module")
@@ -184,15 +183,17 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
 
     look(150, -1, 400)
     look(150, 0, 1)
-    assert not work.is_stalled(1.0)
+    assert not work.is_stalled()
     look(150, 1, 100)
     look(100, 101, 100)  # some of it is gone
-    assert not work.is_stalled(1.0)
+    assert not work.is_stalled()
     look(120, 201, 100)
-    assert work.is_stalled(1.0)
-    assert not work.is_stalled(0.2)  # a slow arm takes longer
+    assert work.is_stalled()
+    work._speed = 0.2
+    assert not work.is_stalled()  # a slow arm takes longer
+    work._speed = 1.0
     look(0, -1, 200)  # from the start the arm hides it
-    assert not work.is_stalled(1.0)
+    assert not work.is_stalled()
     assert work.is_ready()
     look(0, 0, 1)
     look(0, 1, 10)
@@ -203,28 +204,27 @@ def test_ink_that_does_not_become_less_is_looked_at_anew(arm):
     assert not work.is_ready()
 
 
-def test_a_policy_that_stood_still_between_two_strokes_is_shown_the_nearest_alone(arm):
+@pytest.mark.parametrize("speed", [1.0, 0.2])
+def test_a_policy_that_stood_still_between_two_strokes_is_shown_the_nearest_alone(arm, speed):
     white = np.full((455, 455, 3), 220, np.uint8)
     white[200:206, 150:200] = white[300:306, 260:310] = 20
     work = WipingWork(Shown(white))
-    work.prepare(arm, False)
+    work.prepare(arm, False, speed)
     seen = np.zeros(1, seen_dtype(7))[0]
     seen["q"] = [1.5, *arm.home[1:]]  # aside
-    scale = 128 / 455
 
-    def shown(column, row):
-        """Return rows that show ink once nothing has become less for a while under a tool at this pixel."""
-        there = on_plane(np.array([[column, row]]) * scale, np.linalg.inv(work.homography))[0]
-        masks = []
-        for step in range(70):
+    def rows_of_ink(position, looks):
+        """Return the mask's rows that show ink after so many new pictures, the tool being at this x and y."""
+        for step in range(looks):
             work.pictures.number += 1
-            masks.append(work.look(seen, np.array([*there, 0.0, 0.0, 0.0, 0.0]), step)["mask"][..., 0] == 0)
-        assert masks[40][: round(250 * scale)].any()
-        assert masks[40][round(250 * scale) :].any()
-        return np.flatnonzero(masks[-1].any(axis=1)) / scale
+            mask = work.look(seen, np.array([*position, 0.0, 0.0, 0.0, 0.0]), step)["mask"][..., 0]
+        return np.flatnonzero((mask == 0).any(axis=1))
 
-    assert 0 < shown(175, 230).max() < 250
-    assert shown(285, 270).min() > 250
+    behind, before = (0.42, -0.05), (0.62, 0.05)  # the camera looks from the front: x is down in its picture
+    assert rows_of_ink(behind, 50).min() < 60
+    assert rows_of_ink(behind, 50).max() > 80
+    assert rows_of_ink(behind, round(70 / speed)).max() < 60
+    assert rows_of_ink(before, round(70 / speed)).min() > 80
 
 
 def hiding(arm):
@@ -266,7 +266,7 @@ def test_work_that_was_given_up_remembers_what_the_arm_hides(arm):
     look(True, False, -1, 10)
     look(True, False, 0, 1)
     look(True, False, 1, 160)
-    assert work.is_stalled(1.0)
+    assert work.is_stalled()
     look(True, True, -1, 100)  # from the start the arm hides it
     assert work.is_ready()
     look(True, True, 0, 1)

@@ -64,9 +64,10 @@ class InsertionWork:
         """No camera looks."""
         return None
 
-    def prepare(self, arm: Arm, lockstep: bool) -> None:
+    def prepare(self, arm: Arm, lockstep: bool, speed: float = 1.0) -> None:
         """Take the arm whose torques tell the wrench."""
         del lockstep
+        self._speed = speed
         self._arm, self._bias, self._wrench = arm, np.zeros(6), np.zeros(6)
         self._depth, self._waited, self._steps = 0.0, 0, -1
 
@@ -104,9 +105,9 @@ class InsertionWork:
         """Tell whether the peg is in."""
         return self._depth >= self._config.depth_m
 
-    def is_stalled(self, speed: float) -> bool:
+    def is_stalled(self) -> bool:
         """Tell whether the peg has been searching for long."""
-        return self._steps > _STALLED_STEPS / speed
+        return self._steps > _STALLED_STEPS / self._speed
 
     def seen_with(self) -> tuple[float, int]:
         """Return that nothing was seen."""

@@ -16,7 +16,8 @@ from contactsafe.sim.scene import build_plant
 from contactsafe.tasks.wiping.board import BoardConfig, Camera
 from contactsafe.tasks.wiping.photograph import PHOTO_PX, Photographer
 from contactsafe.tasks.wiping.placed_camera import PlacedCamera
-from contactsafe.vision.opencv import cv2, keep_to_one_thread
+from contactsafe.tasks.wiping.robot_goal import LEAST_PX, Goal
+from contactsafe.vision.opencv import keep_to_one_thread
 from contactsafe.vision.segment import Segmenter
 from contactsafe.vision.silhouette import on_plane
 
@@ -40,19 +41,16 @@ begins."""
 _STALLED_LOOKS = 150
 """New pictures, five seconds at full speed, without less ink than before after which the work is begun anew."""
 
-_TORN_LOOKS = 60
-"""New pictures, two seconds, without less ink after which the policy is shown the nearest ink alone: it may stand still
-between two goals that attract it equally."""
-
-_TOGETHER_PX = 5
-"""Ink that is nearer to other ink than half of this is one goal with it."""
+_UNDECIDED_LOOKS = 60
+"""The same after which the policy is shown one piece of ink alone: it may stand still between two that attract it
+equally."""
 
 _REST_M = 2e-4
 """A tool that moves by less between two looks is at rest."""
 
-_LEAST_PX, _SPECK_LOOKS = 3, 90
-"""Fewer inked pixels than this may be specks: they are no reason to begin. Work on nothing else, or on what was last
-seen where the arm is now, ends after so many new pictures."""
+_SPECK_LOOKS = 90
+"""Specks are no reason to begin. Work on nothing else, or on what was last seen where the arm is now, ends after so
+many new pictures."""
 
 
 class Pictures(Protocol):
@@ -109,7 +107,7 @@ class WipingWork:
 
         return plane_homography(self.camera, self.board.centre[2])
 
-    def prepare(self, arm: Arm, lockstep: bool) -> None:
+    def prepare(self, arm: Arm, lockstep: bool, speed: float = 1.0) -> None:
         """Open the camera."""
         keep_to_one_thread()
         self._eye = Photographer(self.camera, self.board, build_plant(arm, WorldConfig(fixtures=())))
@@ -119,6 +117,7 @@ class WipingWork:
         self._mask = np.full((self.camera.size, self.camera.size), 255, np.uint8)
         self._past: deque[tuple[float, np.ndarray]] = deque(maxlen=_REMEMBERED)
         self._left = np.zeros(self._mask.shape, bool)
+        self._goal, self._speed, self._homography = Goal(), speed, self.homography
         self._number, self._age_ms, self._steps = -1, float("nan"), -1
         self._spotless, self._clean, self._inked = 0, 0, 0
         self._least_px, self._no_less, self._unfinished = math.inf, 0, False
@@ -130,7 +129,7 @@ class WipingWork:
         """Segment the newest picture; where the arm hides the board is known by its joints.
 
         Force is what is more than in the air, where the tool waited. Where the board was calibrated to lie elsewhere,
-        the pose is given in the policy's frame, too.
+        the pose is given in the policy's frame. Where nothing gets done, the mask shows one piece of ink alone.
         """
         if steps < 0 <= self._steps:
             self._unfinished = not self.is_done()
@@ -146,17 +145,13 @@ class WipingWork:
             self._count(steps)
         if steps == 0:
             self._spotless, self._clean, self._unfinished = 0, 0, False
+            self._goal.drop()
         self._steps = steps
-        observed = {"force": seen["force"] - self._tare_n}
         if self.placed is not None:
-            pose = observed["pose"] = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
-        torn = self._no_less > _TORN_LOOKS
-        observed["mask"] = (_nearest_ink(self._mask, self._pixel_of(pose)) if torn else self._mask)[..., None]
-        return observed
-
-    def _pixel_of(self, pose: np.ndarray) -> np.ndarray:
-        """Return where the mask shows the board under the tool, u and v."""
-        return on_plane(pose[None, :2], self.homography)[0]
+            pose = pose - np.array([*self.placed.shift, 0.0, 0.0, 0.0])
+        is_undecided = steps > 0 and self._no_less > _UNDECIDED_LOOKS / self._speed
+        mask = self._goal.show(self._mask, self._left, on_plane(pose[:2], self._homography), is_undecided)
+        return {"mask": mask[..., None], "force": seen["force"] - self._tare_n, "pose": pose}
 
     def _remember(self, beside: np.ndarray, steps: int) -> None:
         """Take ink that the arm hides for what it was when last seen in this work, or in what was given up before."""
@@ -165,7 +160,7 @@ class WipingWork:
 
     def _count(self, steps: int) -> None:
         """Count new pictures with ink and without, and those since the least ink of this work was left."""
-        shows, left = int(np.count_nonzero(self._mask == 0)) >= _LEAST_PX, int(np.count_nonzero(self._left))
+        shows, left = int(np.count_nonzero(self._mask == 0)) >= LEAST_PX, int(np.count_nonzero(self._left))
         self._spotless = 0 if left > 0 else self._spotless + 1
         self._clean = 0 if shows else self._clean + 1
         self._inked = self._inked + 1 if shows else 0
@@ -202,9 +197,9 @@ class WipingWork:
         """Tell whether no ink has been left for a while, or none been seen but specks for longer."""
         return self._spotless >= _CLEAN_LOOKS or self._clean >= _SPECK_LOOKS
 
-    def is_stalled(self, speed: float) -> bool:
+    def is_stalled(self) -> bool:
         """Tell whether there has been no less ink for long: a policy that remembers nothing may go round in circles."""
-        return self._no_less > _STALLED_LOOKS / speed
+        return self._no_less > _STALLED_LOOKS / self._speed
 
     def seen_with(self) -> tuple[float, int]:
         """Return the picture's age and how much ink its mask shows."""
@@ -214,13 +209,3 @@ class WipingWork:
         """Let go of the camera."""
         self.pictures.close()
 
-
-def _nearest_ink(mask: np.ndarray, pixel: np.ndarray) -> np.ndarray:
-    """Return a mask without all ink but the piece that is nearest to a pixel."""
-    ink = (mask == 0).astype(np.uint8)
-    places = np.argwhere(ink)
-    if len(places) == 0:
-        return mask
-    _, pieces = cv2.connectedComponents(cv2.dilate(ink, np.ones((_TOGETHER_PX,) * 2, np.uint8)))
-    nearest = places[np.linalg.norm(places - pixel[::-1], axis=1).argmin()]
-    return np.where((ink > 0) & (pieces == pieces[tuple(nearest)]), 0, 255).astype(np.uint8)
