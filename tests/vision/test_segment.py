@@ -117,6 +117,16 @@ def test_nothing_is_looked_for_where_the_arm_stands_and_off_the_board(segmenter)
     assert not (found & ~cv2.dilate(expected(where).astype(np.uint8), np.ones((3, 3))).astype(bool)).any()
 
 
+def test_ink_beside_the_arm_is_ink_where_it_goes_on_further_inside(segmenter):
+    """The arm's own dark edge beside its outline, where the camera is some pixels off, was taken for ink."""
+    hidden, blob, stroke = np.zeros((N, N), np.uint8), np.zeros((N, N)), np.zeros((N, N))
+    hidden[100:200] = 255
+    blob[200:205, 100:140] = stroke[204:260, 200:206] = 1.0
+    edge, line = ((segmenter.segment(photo(board() * (1 - 0.8 * what)), hidden)) == 0 for what in (blob, stroke))
+    assert not edge.any()
+    assert np.flatnonzero(line.any(axis=1)).min() * N / 128 < 206
+
+
 def test_what_the_arm_hides_is_not_beside_it(segmenter):
     hidden = np.zeros((N, N), np.uint8)
     assert segmenter.beside(hidden).all()

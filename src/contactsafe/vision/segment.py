@@ -34,8 +34,8 @@ class InkThresholds:
         line: a pixel this fraction darker than both sides of a line may be ink, where the line is long.
         clear_line: a line has a pixel this much darker.
         line_px: of the photograph's pixels, how long a line is at least; half as many are as wide as one is at most.
-        rim_px: of the photograph's pixels, how far inside the board's edge and outside the arm's outline is not looked;
-            within twice as far nothing but the end of a stroke is ink.
+        rim_px: margin inside the board's edge and around the arm's outline that is ignored, in the photograph's pixels;
+            up to twice as far from them ink counts only if it goes on further inside.
     """
 
     faint: float = 0.15
@@ -119,7 +119,7 @@ class Segmenter:
             darkest = _darkest(photo[self._window], seen)
             background = _background(darkest, seen)
             evened = cv2.divide(darkest, background, scale=_BRIGHT)
-            # Within two rims of the arm and of the picture's end all may be dark by what is beyond.
+            # A camera some pixels off, or a picture that was straightened, has the dark edge of what is beyond here.
             well_inside = cv2.erode(seen, self._rim, borderType=cv2.BORDER_CONSTANT, borderValue=0)
             specks = self._ink(cv2.GaussianBlur(evened, (3, 3), 0), seen, well_inside)
             ink[self._window] = cv2.bitwise_or(specks, self._lines(darkest, background, well_inside))
@@ -129,7 +129,7 @@ class Segmenter:
     def beside(self, hidden: np.ndarray) -> np.ndarray:
         """Return which of the mask's pixels are beside the arm, bool (mask_size, mask_size); see `segment`.
 
-        Nearer than two rims it is the end of a stroke at most that is seen, so all of that counts as hidden.
+        Within two rims of the arm only the end of a stroke can be seen, so all of that counts as hidden.
         """
         around_arm = cv2.dilate((hidden != 0).astype(np.uint8) * 255, self._rim, iterations=2)
         covered = cv2.resize(around_arm, (self.mask_size, self.mask_size), interpolation=cv2.INTER_AREA)
@@ -162,16 +162,17 @@ class Segmenter:
         ink.ravel()[places] = kept[names]
         return ink
 
-    def _lines(self, darkest: np.ndarray, background: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    def _lines(self, darkest: np.ndarray, background: np.ndarray, well_inside: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
         smooth = cv2.min(darkest, background)  # nor is what lies between two reflections
-        smooth = cv2.GaussianBlur(cv2.bitwise_and(smooth, seen), (5, 5), _LINE_BLUR_PX)
+        # What is beyond is black, so that the shadow beside it has no brighter side there.
+        smooth = cv2.GaussianBlur(cv2.bitwise_and(smooth, well_inside), (5, 5), _LINE_BLUR_PX)
         sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)
         hollow = cv2.divide(cv2.morphologyEx(smooth, cv2.MORPH_BLACKHAT, sides), background, scale=_BRIGHT)
-        usual, noise = _middle_and_spread(hollow, seen)
+        usual, noise = _middle_and_spread(hollow, well_inside)
         core = hollow > cv2.dilate(hollow, np.ones((5, 5), np.uint8)) // 2  # and not what blurs beside it
         dark = hollow > max(usual + 5 * noise, _BRIGHT * self.ink.line)
-        candidates = cv2.bitwise_and((dark & core).view(np.uint8), seen)
+        candidates = cv2.bitwise_and((dark & core).view(np.uint8), well_inside)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(candidates, connectivity=8)
         places = np.flatnonzero(candidates)
         names = labels.ravel()[places]

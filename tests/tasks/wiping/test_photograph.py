@@ -101,6 +101,7 @@ def test_the_last_specks_are_found(studio, severity):
     assert found / specks >= 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.0, 3.0), (3.0, 0.0), (-2.0, -2.0)])
 def test_a_camera_some_pixels_off_saw_ink_along_the_tools_own_edge(studio, shift):
     """A policy circled such ink for twenty seconds; it was in four of five pictures of a camera three pixels off."""

@@ -208,4 +208,3 @@ class WipingWork:
     def close(self) -> None:
         """Let go of the camera."""
         self.pictures.close()
-
