@@ -1,5 +1,7 @@
 """Models as people download them: servos, gravcomp, no site, 2 ms, limits in a class. One symptom a test."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -195,7 +197,7 @@ def test_key_frame_of_another_name_is_found_by_it_or_its_beginning():
     spec = servo('<key name="ready" qpos="0 0.3 0.2 0" ctrl="0 0.3 0.2 0" act="0.3"/>', others)
     for name in ("rest", "res"):
         assert_array_equal(robots.from_mjcf(spec, FLANGE, actuators="torque", home=name).home, [0.0, 1.0, 1.0, 0.0])
-    with pytest.raises(InvalidInputError, match=r"home = 're' is none of the key frames 'ready', 'rest'; give one"):
+    with pytest.raises(InvalidInputError, match=r"home = 're' is none of the key frames; give one of 'ready', 'rest'"):
         robots.from_mjcf(spec, FLANGE, actuators="torque", home="re")
     with pytest.warns(ModelWarning, match=r"home is one that was chosen here, since no key frame is called 'home'"):
         robots.from_mjcf(spec, FLANGE, actuators="torque")
@@ -274,6 +276,28 @@ def test_what_cannot_be_asked_is_told_in_one_line(name):
     with pytest.raises(InvalidInputError) as caught:
         robots.from_mjcf(servo(), **{"site": FLANGE, "actuators": "torque"} | options)
     assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("site", ["tip", FLANGE])
+def test_a_part_of_a_model_was_said_to_lack_a_site(tmp_path, site):
+    """An xArm's file holds its bodies in a form that another file includes: to MuJoCo it is empty by itself."""
+    part = tmp_path / "part.xml"
+    part.write_text("<mujoco/>", encoding="utf-8")
+    with pytest.raises(InvalidInputError, match="no bodies; if it is a part, give the file that includes it"):
+        robots.from_mjcf(part, site, actuators="torque")
+
+
+def test_a_key_frame_was_to_be_chosen_where_there_are_none():
+    bare = re.sub(r"<keyframe>.*</keyframe>", "", SERVO, flags=re.DOTALL)
+    with pytest.raises(InvalidInputError, match="home = 'ready', and the model has no key frames; give joint"):
+        robots.from_mjcf(mujoco.MjSpec.from_string(bare), FLANGE, actuators="torque", home="ready")
+
+
+def test_an_arm_without_any_actuator_is_to_get_motors():
+    bare = re.sub(r"<actuator>.*</actuator>", "", SERVO, flags=re.DOTALL)
+    bare = re.sub(r"<keyframe>.*</keyframe>", "", bare, flags=re.DOTALL)
+    with pytest.raises(InvalidInputError, match='no actuator; give actuators="torque" for motors of their own'):
+        robots.from_mjcf(mujoco.MjSpec.from_string(bare), FLANGE)
 
 
 def test_unknown_keyword_is_named_with_those_there_are():

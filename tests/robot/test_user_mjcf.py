@@ -245,13 +245,12 @@ REFUSED = {
     ),
     "no torque limit": (
         [MOTOR_B, '<motor joint="b"/>'], {},
-        "joint 'b' has no torque limit; give tau_max=[...], 2 numbers in N m, and its motor a forcerange on both sides "
-        "of 0",
+        "joint 'b' has no torque limit; give tau_max=[...], 2 numbers in N m",
     ),
     "one-sided motor": (
         [MOTOR_B, '<motor joint="b" ctrlrange="0 5"/>'], {},
-        "joint 'b' has a torque limit of 0 N m, which is not above 0; give tau_max=[...], 2 numbers in N m, and its "
-        "motor a forcerange on both sides of 0",
+        "joint 'b' has a torque limit of 0 N m, which is not above 0; give its motor a forcerange on both sides of "
+        "0, and no tau_max of 0",
     ),
     "carries itself": (
         ['name="plate"', 'name="plate" gravcomp="1"'], {},

@@ -67,6 +67,8 @@ def add_flange(spec: mujoco.MjSpec, site: str | Flange | None) -> str | None:
         if spec.site(site.body) is not None:
             raise InvalidInputError(f"{shown(site.body)} is a site, no body; give its name itself, without Flange")
         names = listed(one.name for one in spec.bodies[1:] if one.name)
+        if len(spec.bodies) == 1:
+            raise InvalidInputError("the model has no bodies; if it is a part, give the file that includes it")
         raise InvalidInputError(f"body {shown(site.body)} of the flange is not in the model; give one of: {names}")
     taken = {
         one.name for one in spec.sites if one.parent.name != site.body or not np.array_equal(one.pos, site.position)

@@ -71,6 +71,8 @@ def _suitable(model: mujoco.MjModel, chosen: list[int], by_itself: bool, finding
     if bare:
         it = "it" if len(bare) == 1 else "them"
         remedy = f"give joints=[...] with {it}, or without {it}, to lock {it}"
+        if len(bare) == len(hinges):
+            remedy = f'give actuators="torque" for motors of {"its" if len(bare) == 1 else "their"} own'
         findings.problem(f"{several(model, JOINT, bare)} no actuator; {remedy}{those}")
     for joint in hinges if not many else []:
         with findings.noting():

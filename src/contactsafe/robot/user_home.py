@@ -29,6 +29,18 @@ HOME = "home"
 """The key frame that is taken where none is named."""
 
 
+def _asked_for(names: list[str], asked: str) -> str:
+    """Return the name that is asked for, or whose first letters are, if they are of only one."""
+    if not names:
+        what = f"home = {asked!r}, and the model has no key frames"
+        raise InvalidInputError(f"{what}; give joint positions, or leave it out: one is chosen")
+    found = [name for name in names if name == asked] or [one for one in names if asked and one.startswith(asked)]
+    if len(found) != 1:
+        known = listed(map(repr, names))
+        raise InvalidInputError(f"home = {asked!r} is none of the key frames; give one of {known}")
+    return found[0]
+
+
 def key_frame(model: mujoco.MjModel, chain: list[int], asked: str | None, findings: Findings) -> int:
     """Find the key frame of an arm's home; −1 for none.
 
@@ -44,10 +56,7 @@ def key_frame(model: mujoco.MjModel, chain: list[int], asked: str | None, findin
     """
     names = [mujoco.mj_id2name(model, _KEY, i) or "" for i in range(model.nkey)]
     if asked is not None:
-        found = [name for name in names if name == asked] or [one for one in names if asked and one.startswith(asked)]
-        if len(found) != 1:
-            raise InvalidInputError(f"home = {asked!r} is none of the key frames {listed(map(repr, names))}; give one")
-        return names.index(found[0])
+        return names.index(_asked_for(names, asked))
     if HOME in names:
         return names.index(HOME)
     if len(names) == 1:

@@ -53,14 +53,14 @@ def torque_limits(model: mujoco.MjModel, chain: list[int], given: ArrayLike | No
     if given is not None:
         with findings.noting():
             limits = np.minimum(limits, finite_array(given, limits.shape, "tau_max"))
-    remedy = f"give tau_max=[...], {len(chain)} numbers in N m, and its motor a forcerange on both sides of 0"
     unlimited = [joint for joint, limit in zip(chain, limits, strict=True) if not limit < np.inf]
     if unlimited:
+        remedy = f"give tau_max=[...], {len(chain)} numbers in N m"
         findings.problem(f"{several(model, JOINT, unlimited)} no torque limit; {remedy}")
     for joint, limit in zip(chain, limits, strict=True):
         if not limit > 0.0:
             one = f"joint {label(model, JOINT, joint)} has a torque limit of {limit:g} N m, which is not above 0"
-            findings.problem(f"{one}; {remedy}")
+            findings.problem(f"{one}; give its motor a forcerange on both sides of 0, and no tau_max of 0")
     return np.where(limits > 0.0, limits, np.inf)
 
 
