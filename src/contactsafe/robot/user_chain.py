@@ -56,6 +56,14 @@ def _named(model: mujoco.MjModel, names: Sequence[str], findings: Findings) -> l
     return found
 
 
+def _motors_for(bare: int, hinges: int) -> str:
+    """Return the remedy where some hinges have no actuator."""
+    if bare == hinges:
+        return 'give actuators="torque" for motors of their own'
+    it = "it" if bare == 1 else "them"
+    return f"give joints=[...] with {it}, or without {it}, to lock {it}"
+
+
 def _suitable(model: mujoco.MjModel, chosen: list[int], by_itself: bool, findings: Findings, many: bool) -> list[int]:
     """Return those of the joints that are hinges, and tell of the others; of all, where they are to have actuators."""
     hinges = [joint for joint in chosen if model.jnt_type[joint] == _HINGE]
@@ -69,10 +77,7 @@ def _suitable(model: mujoco.MjModel, chosen: list[int], by_itself: bool, finding
         one = f"joint {label(model, JOINT, joint)} is of type {word}; the arm's are hinges"
         findings.problem(f"{one}: give joints=[...] without it, to lock it{those}")
     if bare:
-        it = "it" if len(bare) == 1 else "them"
-        remedy = f"give joints=[...] with {it}, or without {it}, to lock {it}"
-        if len(bare) == len(hinges):
-            remedy = f'give actuators="torque" for motors of {"its" if len(bare) == 1 else "their"} own'
+        remedy = _motors_for(len(bare), len(hinges))
         findings.problem(f"{several(model, JOINT, bare)} no actuator; {remedy}{those}")
     for joint in hinges if not many else []:
         with findings.noting():
