@@ -151,9 +151,9 @@ def test_work_begins_with_ink_ends_without_and_needs_sight(arm):
     assert work.is_done()
     assert not work.is_ready()
     speck = white.copy()
-    speck[200:203, 200:202] = 20
+    speck[197:201, 198:202] = 20  # of 5 mm across, where four pixels of the mask meet
     look(speck, 50)  # too small to begin with, but what has been begun is gone on with for a while
-    assert 0 < work.seen_with()[1] < 3
+    assert work.seen_with()[1] == 4
     assert not work.is_done()
     assert not work.is_ready()
     look(speck, 40)

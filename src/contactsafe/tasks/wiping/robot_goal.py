@@ -5,8 +5,8 @@ import numpy as np
 from contactsafe.vision.opencv import cv2
 from contactsafe.vision.segment import INK_PIXEL, OTHER_PIXEL
 
-LEAST_PX = 3
-"""Fewer inked pixels than this may be specks."""
+LEAST_PX = 5
+"""Fewer inked pixels than this may be specks: a dot smaller than one pixel can touch four."""
 
 _APART_PX = 5
 """Ink of the mask no further apart than this, 23 mm across the board, is one piece: the strokes of a letter are."""
