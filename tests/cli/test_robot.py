@@ -13,6 +13,7 @@ from contactsafe.hardware.status import status_dtype
 from contactsafe.robot import robots
 from contactsafe.robot.franka import HAND, WIPER
 from contactsafe.tasks.insertion.robot import InsertionRobot
+from contactsafe.tasks.wiping.robot import WipingRobot
 
 
 @pytest.mark.parametrize(("words", "told"), [
@@ -39,7 +40,10 @@ def test_a_robot_that_is_not_there_is_told_in_one_line(capsys, tmp_path):
     pytest.importorskip("pylibfranka")
     assert main(["run", "--robot", "127.0.0.9", "--dry-run", "--out", str(tmp_path / "out")]) == 1
     said = capsys.readouterr().err.strip().splitlines()
-    assert len([line for line in said if "compiling" not in line]) == 1
+    said = [line for line in said if "compiling" not in line]
+    assert len(said) == 1
+    assert "no Franka answers at 127.0.0.9 (" in said[0]
+    assert "check the address, the cable, and FCI in Desk" in said[0]
 
 
 def test_the_robot_is_told_what_the_tool_weighs_beyond_its_hand():
@@ -95,6 +99,10 @@ def test_the_checklist_names_robot_tool_way_speed_and_stop():
     text = checklist(Options(robot="172.16.0.2", speed=0.2), arm, task.work(), reading_at(arm, arm.home))
     for word in ("172.16.0.2, idle", "franka hand with peg", "first move", "speed        0.2", "emergency stop"):
         assert word in text
+    assert "camera" not in text
+    wiping = WipingRobot()
+    arm = robots.fr3(wiping.tool)
+    assert "nothing was calibrated" in checklist(Options(robot="a"), arm, wiping.work(), reading_at(arm, arm.home))
 
 
 def test_the_checklist_says_where_the_calibrated_camera_stands(tmp_path):

@@ -86,11 +86,14 @@ def test_a_log_without_its_beginning_is_refused(rows, tmp_path):
         torques_again(written(tmp_path / "run.mcap", rows[10:]))
 
 
-@pytest.mark.parametrize("name", ["none.mcap", "other.mcap"])
-def test_what_is_no_run_cannot_be_computed_again(tmp_path, capsys, name):
+@pytest.mark.parametrize(("name", "told"), [
+    ("none.mcap", "none.mcap does not exist; give the run.mcap"),
+    ("other.mcap", "is no log of `contactsafe run`"),
+])  # fmt: skip
+def test_what_is_no_run_cannot_be_computed_again(tmp_path, capsys, name, told):
     (tmp_path / "other.mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(100))
     assert main(["replay", str(tmp_path / name), "--torques"]) == 1
-    assert "is no log of `contactsafe run`" in capsys.readouterr().err
+    assert told in capsys.readouterr().err
 
 
 def test_it_is_read_as_a_log_with_the_robots_own_time_and_torque(rows, tmp_path):

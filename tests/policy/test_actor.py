@@ -40,11 +40,11 @@ class Work(InsertionWork):
 class Stage:
     """An actor before an arm that is always where its target was a step ago."""
 
-    def __init__(self, rounds=0, speed=1.0):
+    def __init__(self, **options):
         self.arm = robots.fr3(PEG)
         self.exchange, self.work = Exchange.create(7), Work(InsertionConfig())
         self.work.prepare(self.arm, False)
-        settings = PolicySettings(self.arm, shipped_bundle("insertion"), self.work, speed=speed, rounds=rounds)
+        settings = PolicySettings(self.arm, shipped_bundle("insertion"), self.work, **options)
         self.actor, self.tick = Actor(settings, self.exchange), 0
         self.message = np.zeros(1, message_dtype(7))
         seen, pose = self.actor.seen[0], self.arm.tool_pose(self.arm.home)
@@ -98,6 +98,15 @@ def test_it_goes_aside_before_down_at_the_works_own_speed(stage):
     aside = np.linalg.norm(path[:, :2] - start[:2], axis=1) > 1e-3
     assert np.ptp(path[aside][:, 2]) < 1e-9
     assert math.dist(path[-1], start) < 0.01
+
+
+def test_an_arm_that_is_to_hold_waits_at_the_start_whatever_there_is_to_do(stage):
+    one, other = stage(hold=True), stage()
+    other.travel()
+    for _ in range(len(other.path) + 60):
+        one.step()
+    assert one.actor.steps == -1
+    assert math.dist(one.path[-1], one.work.start.position) < 0.01
 
 
 def test_at_a_fifth_of_the_speed_it_takes_five_times_as_long(stage):

@@ -106,7 +106,9 @@ def _compare_torques(asked: Options) -> None:
     from contactsafe.hardware.run_log import is_run
     from contactsafe.logs.robot_run import torques_again
 
-    if not asked.log.is_file() or not is_run(asked.log):
+    if not asked.log.is_file():
+        raise InvalidInputError(f"{asked.log} does not exist; give the run.mcap of a `contactsafe run`")
+    if not is_run(asked.log):
         raise InvalidInputError(f"{asked.log} is no log of `contactsafe run`; give its run.mcap")
     again = torques_again(asked.log)
     if again.same < again.ticks:

@@ -80,7 +80,7 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
         f"tool         {arm.tool.name if arm.tool else 'none'}, {weight}; now at {_words(tool)} m",
         f"first move   {up}aside, turning down, and down to {_words(start)} m: is that path free?",
         f"workspace    about {_words(np.array(work.centre))} m: does what is worked on stand there, level?",
-        *_camera_lines(asked),
+        *_camera_lines(asked, work),
         f"controller   {asked.controller}{_LESS_SAFE if asked.controller == 'vices' else ''}",
         f"speed        {asked.speed:g} of the policy's own; begin with --speed 0.2",
         f"collisions   the robot stops by itself beyond {COLLISION_NM:g} N m and {COLLISION_N:g} N: raised, since the "
@@ -90,10 +90,11 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
     return "\n".join(lines)
 
 
-def _camera_lines(asked: Options) -> list[str]:
-    """Return what was calibrated of the camera."""
+def _camera_lines(asked: Options, work: Work) -> list[str]:
+    """Return what was calibrated of the camera; that nothing was, where the work looks through one."""
     if asked.camera_calibration is None:
-        return []
+        looks = work.homography is not None
+        return ["camera       nothing was calibrated: do camera and board stand as in training?"] if looks else []
     from contactsafe.cli.calibrate import lines_of
     from contactsafe.vision.camera_calibration import CameraCalibration
 

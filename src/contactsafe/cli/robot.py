@@ -80,9 +80,10 @@ class Options:
         against: preset of a second simulated run, to compare with; none for no second run.
         rounds: of work, such as boards, after which a simulated run ends.
         speed: factor on how fast the target moves, 0.05 to 1.
+        hold: go to where the work begins and stay there; the policy is not asked.
         camera: serial number of the RealSense; the first one found where it is not given.
         recover: acknowledge the error that stopped the robot before; look at what stopped it first.
-        dry_run: look at the robot, print the checklist, move nothing.
+        dry_run: look at the robot, tell it load and collision thresholds, print the checklist, move nothing.
         yes: do not ask before the robot moves.
         alone: nothing pushes or meets the simulated arm.
         lockstep: the simulated robot waits for each command, so that a run is the same again, however slow the machine.
@@ -104,6 +105,7 @@ class Options:
     against: Annotated[str, one_of(("none", *presets.PRESETS), also=presets.FORM)] = "vices"
     rounds: int = 3
     speed: float = 1.0
+    hold: bool = False
     camera: str | None = None
     recover: bool = False
     dry_run: bool = False
@@ -120,7 +122,8 @@ class Options:
     def check(self) -> None:
         """Refuse what cannot be."""
         if self.simulated == (self.robot is not None):
-            raise InvalidInputError("give --robot ADDRESS for a Franka, or --simulated for one on this machine")
+            given = "both are" if self.simulated else "neither is"
+            raise InvalidInputError(f"give --robot ADDRESS for a Franka, or --simulated for one here; {given} given")
         if not 1.0 <= self.seconds <= 86400.0:
             raise InvalidInputError(f"seconds = {self.seconds}; give 1 to 86400")
         if not 0.05 <= self.speed <= 1.0:
@@ -213,7 +216,7 @@ def parts_of(
     port = ARMS[asked.arm][1](address, load_of(arm))
     settings = ControlSettings(arm, presets.by_name(controller), port, asked.lockstep, rights)
     rounds = asked.rounds if asked.simulated else 0
-    policy = PolicySettings(arm, bundle, work, asked.speed, asked.lockstep, rounds)
+    policy = PolicySettings(arm, bundle, work, asked.speed, asked.lockstep, rounds, asked.hold)
     return [
         Part("watchdog", watch),
         Part("recorder", record, (log, said)),

@@ -73,8 +73,14 @@ class FrankaPort:
 
     def reach(self) -> None:
         """Reach the robot to look at it; tell it nothing."""
-        with _named(self._library), realtime.kept():
-            self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+        try:
+            with _named(self._library), realtime.kept():
+                self._robot = self._library.Robot(self._address, self._library.RealtimeConfig.kIgnore)
+        except RobotError as error:
+            what = (
+                f"no Franka answers at {self._address} ({error.detail}); check the address, the cable, and FCI in Desk"
+            )
+            raise type(error)(error.names, what) from None
 
     def look(self, reading: np.ndarray) -> None:
         """Fill a reading of a robot at rest."""

@@ -17,7 +17,7 @@ class RobotError(ContactSafeError):
 
     def __init__(self, names: tuple[str, ...], detail: str):
         super().__init__(f"{', '.join(names) or 'robot error'}: {detail}")
-        self.names = names
+        self.names, self.detail = names, detail
 
 
 class RobotSilentError(RobotError):

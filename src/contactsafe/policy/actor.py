@@ -48,6 +48,7 @@ class PolicySettings:
         speed: factor on how fast the target moves, at most 1.
         lockstep: the control process waits for it, so that a run is the same again.
         rounds: of work after which it ends; 0 for no end.
+        hold: the arm stays where the work would begin; the policy is not asked.
     """
 
     arm: Arm
@@ -56,6 +57,7 @@ class PolicySettings:
     speed: float = 1.0
     lockstep: bool = False
     rounds: int = 0
+    hold: bool = False
 
 
 class Actor(Unique):
@@ -106,7 +108,7 @@ class Actor(Unique):
             self.done = self.settings.rounds > 0 and self.rounds >= self.settings.rounds
         elif self.steps >= 0 and self.work.is_stalled():
             self.steps, self.waited = -1, 0
-        if self.steps < 0 and self._travel() and self.work.is_ready():
+        if self.steps < 0 and self._travel() and self.work.is_ready() and not self.settings.hold:
             self.steps = 0
             self.policy.begin()
             observation.update(self.work.look(self.seen[0], self.pose, self.steps))

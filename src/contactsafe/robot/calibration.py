@@ -158,7 +158,8 @@ class Calibration:
             with path.open("rb") as file:
                 text = file.read(_MOST + 1)
         except OSError as error:
-            raise InvalidInputError(f"{path} cannot be read: {error.strerror or error}; give a calibration") from None
+            what = f"{path} cannot be read: {error.strerror or error}"
+            raise InvalidInputError(f"{what}; give what `contactsafe identify --save` wrote") from None
         try:
             found = json.loads(text) if len(text) <= _MOST else None
         except (ValueError, RecursionError):
