@@ -332,6 +332,20 @@ def take(photographer):
     return [photographer.take(np.zeros((250, 300), np.uint8), seen, 1, 2)]
 
 
+def goal():
+    pytest.importorskip("cv2")
+    from contactsafe.tasks.wiping.robot_goal import Goal
+
+    return Goal()
+
+
+def choose(goal):
+    """What is shown of two strokes: the nearer one, once it has been chosen."""
+    mask = np.full((64, 64), 255, np.uint8)
+    mask[30:34, 20:26] = mask[10:14, 50:56] = 0
+    return [goal.show(mask, mask == 0, np.array([20.0, 20.0]), True)]
+
+
 def segment(segmenter):
     return [segmenter.segment(np.full((455, 455, 3), 200, np.uint8), np.zeros((455, 455), np.uint8))]
 
@@ -364,6 +378,7 @@ ACTORS = {
     "Photographer": (begun(photographer, take), take),
     "PhotographSource": (begun(photographed, run_tasks), run_tasks),
     "Segmenter": (lambda: photographed()._photographs._segmenter, segment),
+    "Goal": (begun(goal, choose), choose),
     "Playback": (begun(playback, play), play),
     "LateWorlds": (begun(late_worlds, run_worlds), run_worlds),
     "LatePlayback": (begun(late_playback, play), play),

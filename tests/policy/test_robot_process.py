@@ -113,7 +113,7 @@ class Blind(InsertionWork):
 
     closed = False
 
-    def prepare(self, arm, lockstep):
+    def prepare(self, arm, lockstep, speed=1.0):
         raise InvalidInputError("no camera is connected; check the cable")
 
     def close(self):
