@@ -93,8 +93,8 @@ def checklist(asked: Options, arm: Arm, work: Work, reading: np.void) -> str:
 def _camera_lines(asked: Options, work: Work) -> list[str]:
     """Return what was calibrated of the camera; that nothing was, where the work looks through one."""
     if asked.camera_calibration is None:
-        looks = work.homography is not None
-        return ["camera       nothing was calibrated: do it and what it looks at stand as in training?"] if looks else []
+        line = "camera       nothing was calibrated: do it and what it looks at stand as in training?"
+        return [] if work.homography is None else [line]
     from contactsafe.cli.calibrate import lines_of
     from contactsafe.vision.camera_calibration import CameraCalibration
 
