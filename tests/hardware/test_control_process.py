@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from contactsafe.hardware import company, states
+from contactsafe.hardware import heartbeats, states
 from contactsafe.hardware.control_process import control
 from contactsafe.hardware.port import RobotError, RobotSilentError
 
@@ -65,7 +65,7 @@ def test_a_run_that_is_called_off_before_it_begins_never_takes_the_robot(bench):
 
 
 def test_a_run_whose_command_and_watchdog_die_before_it_begins_never_takes_the_robot(bench, monkeypatch):
-    monkeypatch.setattr(company, "_ALONE_S", 0.1)
+    monkeypatch.setattr(heartbeats, "_ALONE_S", 0.1)
     one = bench()
     control(str(one.exchange.path), one.settings)
     assert one.robot.calls == ["connect", "close"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.hardware import company
+from contactsafe.hardware import heartbeats
 from contactsafe.hardware.exchange import TICKS, Exchange
 from contactsafe.hardware.messages import row_dtype, step_dtype
 from contactsafe.hardware.recorder import Recorder, record
@@ -108,7 +108,7 @@ def test_a_full_disk_ends_the_log_and_not_the_run(exchange, capfd):
 
 
 def test_it_ends_when_nobody_is_left(exchange, tmp_path, monkeypatch):
-    monkeypatch.setattr(company, "_ALONE_S", 0.1)
+    monkeypatch.setattr(heartbeats, "_ALONE_S", 0.1)
     record(str(exchange.path), tmp_path / "run.mcap", RUN)
     assert read_run(tmp_path / "run.mcap", row_dtype(7))[0] == RUN
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contactsafe.core.errors import InvalidInputError
-from contactsafe.hardware import company, states
+from contactsafe.hardware import heartbeats, states
 from contactsafe.hardware.exchange import Exchange
 from contactsafe.hardware.mailbox import publish
 from contactsafe.hardware.messages import as_words, seen_dtype
@@ -103,7 +103,7 @@ def test_it_ends_with_the_run(exchange, monkeypatch):
 
 
 def test_it_ends_when_nobody_is_left_who_would_end_the_run(exchange, monkeypatch):
-    monkeypatch.setattr(company, "_ALONE_S", 0.1)
+    monkeypatch.setattr(heartbeats, "_ALONE_S", 0.1)
     robot_process._follow(Acts(None), exchange)
     assert exchange.status["finished"][0] == 0
 

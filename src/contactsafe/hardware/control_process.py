@@ -8,9 +8,9 @@ import traceback
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.core.process import ignore_terminal
 from contactsafe.hardware import realtime
-from contactsafe.hardware.company import Company
 from contactsafe.hardware.control_loop import ControlLoop, ControlSettings
 from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.heartbeats import Heartbeats
 from contactsafe.hardware.port import RobotError, RobotSilentError
 from contactsafe.hardware.states import (
     ASKED,
@@ -63,9 +63,9 @@ def _control(exchange: Exchange, settings: ControlSettings) -> None:
         print(line, flush=True)
     settings.port.connect()
     status["beat_control"] += 1
-    company = Company(status)
+    heartbeats = Heartbeats(status)
     while not status["go"][0]:
-        if company.is_gone():
+        if heartbeats.have_stopped():
             exchange.ask_to_stop(COMMAND_DEAD)
         if status["stop"][0]:
             return

@@ -15,8 +15,8 @@ import numpy as np
 from contactsafe.core.copying import Unique
 from contactsafe.core.errors import InvalidInputError
 from contactsafe.core.process import ignore_terminal
-from contactsafe.hardware.company import Company
 from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.heartbeats import Heartbeats
 from contactsafe.hardware.run_log import CDR, RUN, STEPS_TOPIC, TICKS_TOPIC, ros_schema
 
 _EVERY_S = 0.02
@@ -111,8 +111,8 @@ def record(exchange_path: str, path: Path, run: Mapping[str, str]) -> None:
     status["pid_recorder"] = os.getpid()
     try:
         recorder = Recorder(exchange, path, run)
-        company = Company(status)
-        while not status["finished"][0] and not company.is_gone():
+        heartbeats = Heartbeats(status)
+        while not status["finished"][0] and not heartbeats.have_stopped():
             status["beat_recorder"] += 1
             recorder.drain()
             time.sleep(_EVERY_S)

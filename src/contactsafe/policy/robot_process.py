@@ -5,8 +5,8 @@ import time
 
 from contactsafe.core.errors import ContactSafeError
 from contactsafe.core.process import ignore_terminal
-from contactsafe.hardware.company import Company
 from contactsafe.hardware.exchange import Exchange
+from contactsafe.hardware.heartbeats import Heartbeats
 from contactsafe.hardware.mailbox import receive
 from contactsafe.hardware.states import POLICY_DEAD, POLICY_DONE
 from contactsafe.policy.actor import Actor, PolicySettings
@@ -43,8 +43,8 @@ def act_on_robot(exchange_path: str, settings: PolicySettings) -> None:
 def _follow(actor: Actor, exchange: Exchange) -> None:
     """Step whenever the control process has come to the tick of the next step."""
     status, step, due = exchange.status, 0, 1
-    company = Company(status)
-    while not status["finished"][0] and not company.is_gone():
+    heartbeats = Heartbeats(status)
+    while not status["finished"][0] and not heartbeats.have_stopped():
         sequence = receive(exchange.seen, actor.seen_words)
         tick = int(actor.seen["tick"][0]) if sequence > 0 else 0
         if tick < due:

@@ -29,10 +29,19 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str | None, otherwise
         ]
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
         what = f"{word} = None" if name is None else f"{word} '{name}' is not in the model"
-        if model.nbody == 1:
-            raise InvalidInputError(f"{what}, which has no bodies; if it is a part, give the file that includes it")
+        refuse_part(model.nbody, what)
         raise InvalidInputError(f"{what}; give one of: {listed(filter(None, names))}{otherwise}")
     return found
+
+
+def refuse_part(bodies: int, what: str) -> None:
+    """Refuse a model that holds the world alone: MuJoCo reads so what another file is to include.
+
+    Raises:
+        InvalidInputError: it does.
+    """
+    if bodies == 1:
+        raise InvalidInputError(f"{what}, which has no bodies; if it is a part, give the file that includes it")
 
 
 def or_flange(model: mujoco.MjModel) -> str:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from contactsafe.core.errors import InvalidInputError, shown
-from contactsafe.robot.names import listed
+from contactsafe.robot.names import listed, refuse_part
 
 _LIMITED, _FREE = int(mujoco.mjtLimited.mjLIMITED_TRUE), int(mujoco.mjtLimited.mjLIMITED_FALSE)
 
@@ -66,10 +66,9 @@ def add_flange(spec: mujoco.MjSpec, site: str | Flange | None) -> str | None:
     if body is None:
         if spec.site(site.body) is not None:
             raise InvalidInputError(f"{shown(site.body)} is a site, no body; give its name itself, without Flange")
-        names = listed(one.name for one in spec.bodies[1:] if one.name)
-        if len(spec.bodies) == 1:
-            raise InvalidInputError("the model has no bodies; if it is a part, give the file that includes it")
-        raise InvalidInputError(f"body {shown(site.body)} of the flange is not in the model; give one of: {names}")
+        what = f"body {shown(site.body)} of the flange is not in the model"
+        refuse_part(len(spec.bodies), what)
+        raise InvalidInputError(f"{what}; give one of: {listed(one.name for one in spec.bodies[1:] if one.name)}")
     taken = {
         one.name for one in spec.sites if one.parent.name != site.body or not np.array_equal(one.pos, site.position)
     }

@@ -164,7 +164,7 @@ class Segmenter:
 
     def _lines(self, darkest: np.ndarray, background: np.ndarray, well_inside: np.ndarray) -> np.ndarray:
         """255 where a line is, uint8: long and narrow, and darker than both its sides, as no edge of light is."""
-        smooth = cv2.min(darkest, background)  # nor is what lies between two reflections
+        smooth = cv2.min(darkest, background)  # what lies between two reflections is no line
         # What is beyond is black, so that the shadow beside it has no brighter side there.
         smooth = cv2.GaussianBlur(cv2.bitwise_and(smooth, well_inside), (5, 5), _LINE_BLUR_PX)
         sides = np.ones((self.ink.line_px * 2 // 3,) * 2, np.uint8)

@@ -9,7 +9,7 @@ from contactsafe.core.copying import Unique
 _ALONE_S = 3.0
 
 
-class Company(Unique):
+class Heartbeats(Unique):
     """The two of them, as one of the other processes hears them.
 
     Args:
@@ -21,7 +21,7 @@ class Company(Unique):
     def __init__(self, status: np.ndarray):
         self._status, self._beats, self._heard = status, (-1, -1), time.monotonic()
 
-    def is_gone(self) -> bool:
+    def have_stopped(self) -> bool:
         """Tell whether neither has been heard for three seconds."""
         beats = int(self._status["beat_watchdog"][0]), int(self._status["beat_command"][0])
         if beats != self._beats:
